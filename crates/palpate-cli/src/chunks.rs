@@ -1,4 +1,4 @@
-//! Bytes of a file or of stdin as they arrive. A signal ends the wait for them.
+//! Byte chunks of a file or stdin, read by a thread that a signal can interrupt.
 
 use crate::failure::{Complaint, Failure};
 use crate::progress;
@@ -9,23 +9,19 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 
-/// Bytes of a source. A separate thread reads them, as a blocking read cannot be cancelled.
+/// Chunks of a source, read by a separate thread, as a blocking read cannot be cancelled.
 pub struct Chunks {
-    /// Name of the source: the file, or "stdin".
     pub name: String,
-    /// Messages of the reading thread: an empty one after the source is opened, then chunks until the end.
+    /// Messages of the reading thread: an empty one after the source is opened, then chunks until
+    /// the end.
     chunks: Receiver<io::Result<Vec<u8>>>,
 }
 
-/// Largest size of a chunk, in bytes.
 const CHUNK: usize = 1 << 16;
-/// Number of chunks that are read ahead.
 const AHEAD: usize = 4;
-/// Interval between two checks for a signal.
 const LOOK: Duration = Duration::from_millis(50);
 
 impl Chunks {
-    /// Opens a file; `-` is stdin.
     pub fn open(path: &Path) -> Result<Self, Failure> {
         if path != Path::new("-") {
             return Self::of_file(path);
@@ -36,7 +32,6 @@ impl Chunks {
         Self::read(None, "stdin".to_owned())
     }
 
-    /// Opens a file, also one with the name `-`.
     pub fn of_file(path: &Path) -> Result<Self, Failure> {
         Self::read(Some(path.to_owned()), path.display().to_string())
     }
@@ -50,10 +45,10 @@ impl Chunks {
         Ok(opened)
     }
 
-    /// The next bytes, at least one; `None` after the last.
+    /// Returns the next bytes, at least one; `None` after the last.
     ///
     /// # Errors
-    /// A complaint if the source cannot be read, and [`Failure::Interrupted`] after a signal.
+    /// A complaint if the source cannot be read; [`Failure::Interrupted`] after a signal.
     pub fn next(&mut self) -> Result<Option<Vec<u8>>, Failure> {
         loop {
             if progress::interrupted() {
@@ -68,8 +63,8 @@ impl Chunks {
         }
     }
 
-    /// All bytes of a text up to its end. A zero byte is an error except in UTF-16 with a byte-order mark: a device without an end
-    /// has zero bytes.
+    /// Returns all bytes of a text. A zero byte is an error except in UTF-16 with a byte-order
+    /// mark: an endless device sends zero bytes.
     pub fn read_to_end(mut self) -> Result<Vec<u8>, Failure> {
         let mut bytes = Vec::new();
         while let Some(chunk) = self.next()? {
@@ -85,7 +80,6 @@ impl Chunks {
     }
 }
 
-/// Sends an empty chunk after the source is opened, then all of its bytes; without a path, those of stdin.
 fn send_all(path: Option<PathBuf>, to: &SyncSender<io::Result<Vec<u8>>>) {
     let source: io::Result<Box<dyn Read>> = match path {
         None => Ok(Box::new(io::stdin().lock())),
@@ -95,7 +89,6 @@ fn send_all(path: Option<PathBuf>, to: &SyncSender<io::Result<Vec<u8>>>) {
         Ok(source) => source,
         Err(error) => return drop(to.send(Err(error))),
     };
-    // The reading ends if the receiver is gone.
     let mut listens = to.send(Ok(Vec::new())).is_ok();
     let mut buffer = vec![0; CHUNK];
     while listens {
@@ -108,7 +101,6 @@ fn send_all(path: Option<PathBuf>, to: &SyncSender<io::Result<Vec<u8>>>) {
     }
 }
 
-/// The complaint that a source cannot be read.
 fn unreadable(name: &str, error: &io::Error) -> Failure {
     let complaint = Complaint::new(format!("cannot read {name}: {error}"));
     match error.kind() {

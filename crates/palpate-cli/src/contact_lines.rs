@@ -3,22 +3,20 @@
 use palpate_estimators::estimator::{Track, Tracked};
 use palpate_mechanics::units::format_count;
 
-/// Shortest time between two lines about changes of a contact, for readability.
+/// Shortest time between two lines about changes of a contact.
 const BETWEEN_CHANGES_S: f64 = 1.0;
 
-/// Lines about the contacts of tracks.
+/// Text lines about the contacts of tracks.
 ///
-/// A contact has a line at its beginning and at its end. Between them it has one each time its position or force leaves the 95 %
-/// interval of the last line, at most once in [`BETWEEN_CHANGES_S`].
+/// Each contact has a line at its beginning and end. Between them it has one when its position or
+/// force leaves the 95 % interval of the last line, at most once in [`BETWEEN_CHANGES_S`].
 #[derive(Default)]
 pub struct ContactLines {
     contacts: [Option<Line>; 2],
-    /// Number of contacts so far.
     begun: u64,
     readings: u64,
 }
 
-/// The last line about a contact.
 #[derive(Clone)]
 struct Line {
     /// Number of the contact, from 1.
@@ -29,7 +27,6 @@ struct Line {
 }
 
 impl ContactLines {
-    /// The lines about changes in a track, each with its line end.
     pub fn lines(&mut self, track: &Track) -> String {
         self.readings += 1;
         let time_s = track.time_s;
@@ -63,7 +60,6 @@ impl ContactLines {
         text
     }
 
-    /// A line about all readings.
     pub fn summary(&self) -> String {
         let count = |number: u64, noun: &str| {
             format!("{} {noun}{}", format_count(number), if number == 1 { "" } else { "s" })
@@ -72,7 +68,6 @@ impl ContactLines {
     }
 }
 
-/// True if position or force is outside the 95 % interval of the earlier track.
 fn has_changed(before: &Tracked, now: &Tracked) -> bool {
     let is_outside = |value: f64, (low, high): (f64, f64)| value < low || value > high;
     let has_moved_across =
@@ -82,7 +77,7 @@ fn has_changed(before: &Tracked, now: &Tracked) -> bool {
         || is_outside(now.force_n, before.force_interval_95_n())
 }
 
-/// Position and force with their 95 % intervals, as in "33.0 mm (32.7 to 33.4), 2.00 N (1.96 to 2.03)".
+/// Formats "33.0 mm (32.7 to 33.4), 2.00 N (1.96 to 2.03)".
 fn describe_contact(contact: &Tracked) -> String {
     let mm = |(low_m, high_m): (f64, f64)| (low_m * 1e3, high_m * 1e3);
     let x = with_interval(contact.x_m * 1e3, mm(contact.x_95_m), "mm");
@@ -96,19 +91,17 @@ fn describe_contact(contact: &Tracked) -> String {
     }
 }
 
-/// A value with its interval, rounded to the first digit of the interval's half width.
+/// Formats a value rounded to the first digit of the interval's half width.
 fn with_interval(value: f64, (low, high): (f64, f64), unit: &str) -> String {
     let digit = (0.5 * (high - low)).log10().floor();
     let number = |value: f64| format_to_digit(value, digit);
     format!("{} {unit} ({} to {})", number(value), number(low), number(high))
 }
 
-/// Largest number of decimals, for an interval without width.
 const MOST_DECIMALS: f64 = 4.0;
 /// Numbers from this on are printed with powers of ten.
 const LARGE: f64 = 1e7;
 
-/// A number rounded to a multiple of 10^`digit`.
 fn format_to_digit(value: f64, digit: f64) -> String {
     if !value.is_finite() || value.abs() >= LARGE {
         return format!("{value:.1e}");
@@ -118,7 +111,7 @@ fn format_to_digit(value: f64, digit: f64) -> String {
     let step = 10.0_f64.powf(digit);
     let rounded = (value / step).round() * step;
     let decimals = (-digit).max(0.0) as usize;
-    // Not −0.
+    // Prevents −0.
     format!("{:.decimals$}", rounded + 0.0)
 }
 

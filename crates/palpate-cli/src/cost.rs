@@ -1,4 +1,4 @@
-//! The cost of long work, announced before its start; work above the limit is refused.
+//! Time and memory of long work, announced before its start, with a memory limit.
 
 use crate::failure::{Complaint, Failure};
 use crate::progress::duration;
@@ -15,14 +15,13 @@ pub struct MemoryOption {
     memory_limit: Option<MemoryLimit>,
 }
 
-/// A fit with more time or memory than this is announced.
+/// A more expensive fit is announced.
 const NOTICEABLE: FitCost = FitCost { memory_bytes: 500e6, seconds: 5.0 };
 
-/// Other work with more time than this, in seconds, is announced; it is usually short.
+/// Other work that takes longer, in seconds, is announced.
 const NOTICEABLE_WORK_S: f64 = 3.0;
 
 impl MemoryOption {
-    /// Announces a fit with a long estimated time, and refuses one above the memory limit.
     pub fn check(
         &self,
         estimator: &Estimator,
@@ -41,13 +40,11 @@ impl MemoryOption {
         Ok(())
     }
 
-    /// Reason why an estimator may not be fitted; `None` if it may.
     pub fn refusal(&self, estimator: &Estimator, cost: FitCost) -> Option<String> {
         let exceeded = self.memory_limit?.check_fit(estimator, cost).err()?;
         Some(exceeded.to_string())
     }
 
-    /// Announces other work if it is long, and refuses work above the memory limit.
     pub fn check_work(
         &self,
         what: &str,
@@ -69,7 +66,6 @@ impl MemoryOption {
     }
 }
 
-/// "about 2 min 10 s and 600 MB"
 fn in_words(cost: FitCost) -> String {
     format!(
         "the fit will take at most some {} and {} of memory",

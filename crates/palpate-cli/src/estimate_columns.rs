@@ -5,38 +5,35 @@ use palpate_estimators::estimator::{Locator, Status};
 use palpate_estimators::recording::csv_row;
 use palpate_mechanics::surface::Extent;
 
-/// Columns of estimates, after those of their readings. Cells are empty for values that a locator does not estimate.
+/// Columns of estimates, after those of their readings. Values that a locator does not estimate are
+/// empty.
 #[derive(Clone, Copy)]
 pub struct EstimateColumns {
     extent: Extent,
-    /// Largest number of contacts in an estimate.
     contacts: usize,
     guesses: Guesses,
 }
 
-/// Rows that contain the best estimate of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Guesses {
-    /// Rows that are neither `no_contact` nor `outside_model`, so that averages over a column are of contacts.
+    /// Rows that are neither `no_contact` nor `outside_model`, so that column averages are of
+    /// contacts.
     OfContacts,
     OfAll,
 }
 
 impl Guesses {
-    /// The rows for the option `--all`.
     pub fn by_option(all: bool) -> Self {
         if all { Self::OfAll } else { Self::OfContacts }
     }
 }
 
 impl EstimateColumns {
-    /// Columns of the estimates of a locator.
     pub fn new(locator: &Locator, guesses: Guesses) -> Self {
         let extent = locator.setup.surface().extent();
         Self { extent, contacts: locator.most_contacts(), guesses }
     }
 
-    /// Header line; `first` are the headings of the readings.
     pub fn heading(self, first: &str) -> String {
         let contact = match self.extent {
             Extent::Line { .. } => "position_mm,force_n,low_mm,high_mm,force_low_n,force_high_n",
@@ -54,7 +51,6 @@ impl EstimateColumns {
         format!("{first},{contact},trade_off,status{further}\n")
     }
 
-    /// Line of an estimate.
     pub fn row(self, first: Vec<String>, estimate: &EstimateRecord) -> String {
         let without_contact = [Status::NoContact, Status::OutsideModel].map(Status::name);
         let has_contact = self.guesses == Guesses::OfAll || !without_contact.contains(&estimate.status);
@@ -63,7 +59,6 @@ impl EstimateColumns {
         self.row_of(first, &contacts, estimate.status)
     }
 
-    /// Line of a reading that is not located.
     pub fn empty_row(self, first: Vec<String>, status: &str) -> String {
         self.row_of(first, &[], status)
     }
@@ -77,7 +72,6 @@ impl EstimateColumns {
         csv_row(cells)
     }
 
-    /// Cells of a contact: position, force, the ends of the 95 % intervals of position and force.
     fn cells(self, contact: Option<&ContactRecord>) -> Vec<String> {
         let is_plane = matches!(self.extent, Extent::Plane { .. });
         let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.4}"));

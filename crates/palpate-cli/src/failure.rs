@@ -12,33 +12,31 @@ use std::ops::Range;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Outcome of a command that did not simply succeed.
+/// Outcome of a command other than success.
 #[derive(Debug)]
 pub enum Failure {
-    /// Exit code 1: the command ran, but a stated goal was missed.
+    /// Exit code 1: the command ran, but missed a stated goal.
     GoalMissed(String),
     /// Exit code 2: bad input; no file was written.
     BadInput(Box<Complaint>),
-    /// Exit code 3: the command finished, but data was lost; the places were reported as they occurred.
+    /// Exit code 3: the command finished, but data was lost and reported.
     DataLost(String),
     /// Exit code 128 and the signal: 130 after Ctrl-C, 143 after SIGTERM.
     Interrupted(String),
-    /// The reader of our output has closed it, which is allowed.
+    /// The reader of the output has closed it, which is allowed.
     NobodyReads,
 }
 
 impl Failure {
-    /// A signal before any output.
     pub fn stopped() -> Self {
         Self::Interrupted("stopped; no output was written".to_owned())
     }
 
-    /// Failure of long work that ended early: it was stopped, or its input is bad.
     pub fn from_error(error: &(dyn std::error::Error + 'static)) -> Self {
         if Cancelled::caused(error) { Self::stopped() } else { Complaint::new(error).into() }
     }
 
-    /// Failure of long work that ended early, with a `complaint` that gives details about bad input.
+    /// Failure of long work: it was stopped, or its input is bad, with details in `complaint`.
     pub fn of_work<E>(error: E, complaint: impl FnOnce(E) -> Complaint) -> Self
     where
         E: std::error::Error + 'static,
@@ -46,7 +44,6 @@ impl Failure {
         if Cancelled::caused(&error) { Self::stopped() } else { complaint(error).into() }
     }
 
-    /// Prints the message on stderr, and returns the exit code.
     pub fn report(self) -> ExitCode {
         let (message, code) = match self {
             Self::BadInput(complaint) => {
@@ -63,7 +60,6 @@ impl Failure {
     }
 }
 
-/// Message about bad input, with its place and a remedy.
 #[derive(Debug)]
 pub struct Complaint {
     message: String,
@@ -71,7 +67,6 @@ pub struct Complaint {
     excerpt: Option<Excerpt>,
 }
 
-/// A line of a file with the relevant part.
 #[derive(Debug)]
 struct Excerpt {
     file: String,
@@ -82,17 +77,14 @@ struct Excerpt {
 }
 
 impl Complaint {
-    /// A complaint without a place.
     pub fn new(message: impl fmt::Display) -> Self {
         Self { message: message.to_string(), help: None, excerpt: None }
     }
 
-    /// A complaint about a file at an unknown place.
     pub fn about(path: &Path, problem: impl fmt::Display) -> Self {
         Self::new(format!("{}: {problem}", path.display()))
     }
 
-    /// Adds a remedy.
     pub fn help(mut self, help: impl fmt::Display) -> Self {
         self.help = Some(help.to_string());
         self
@@ -109,7 +101,7 @@ impl Complaint {
         self.at_line(file, line + 1, &text[line_start..line_end], span)
     }
 
-    /// Adds the place: bytes `span` of line number `line` (from 1), which has the content `text`.
+    /// Adds the place: bytes `span` of line `line` (from 1) with the content `text`.
     pub fn at_line(mut self, file: &str, line: usize, text: &str, span: Range<usize>) -> Self {
         // A very long line, as in networks.csv, would make the message unreadable.
         const MOST: usize = 400;
@@ -129,7 +121,7 @@ impl From<Complaint> for Failure {
     }
 }
 
-/// The nearest place at or before `at` where a character begins.
+/// Returns the nearest character boundary at or before `at`.
 fn floor_char(text: &str, at: usize) -> usize {
     text.floor_char_boundary(at.min(text.len()))
 }
@@ -164,7 +156,8 @@ impl SourceCode for Excerpt {
         _lines_before: usize,
         _lines_after: usize,
     ) -> Result<Box<dyn SpanContents<'a> + 'a>, MietteError> {
-        // The heading names the line and the column of the span; the line is drawn from its first character.
+        // The heading contains line and column of the span; the line is drawn from its first
+        // character.
         let column = self.text[..span.offset().min(self.text.len())].chars().count();
         let whole = SourceSpan::from(0..self.text.len());
         let (file, line) = (self.file.clone(), self.line);
@@ -174,7 +167,7 @@ impl SourceCode for Excerpt {
     }
 }
 
-/// Draws complaints in colour on a terminal and in plain characters elsewhere.
+/// Draws complaints in colour on a terminal, in plain characters elsewhere.
 pub fn install_handler() {
     let no_colour = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
     let colour = std::io::stderr().is_terminal() && !no_colour;

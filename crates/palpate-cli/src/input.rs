@@ -1,4 +1,4 @@
-//! Input of a command: palpate's files, with complaints that show the place, and quantities.
+//! Input files and quantities of a command, with complaints that show the place.
 
 use crate::chunks::Chunks;
 use crate::failure::{Complaint, Failure};
@@ -12,7 +12,6 @@ use palpate_rig::{Rig, RigError};
 use palpate_studies::Study;
 use std::path::{Path, PathBuf};
 
-/// Reads the text of a file.
 pub fn read_text(path: &Path) -> Result<String, Failure> {
     let bytes = read_bytes(path)?;
     String::from_utf8(bytes).map_err(|error| {
@@ -21,42 +20,35 @@ pub fn read_text(path: &Path) -> Result<String, Failure> {
     })
 }
 
-/// Reads the bytes of a file.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>, Failure> {
     Chunks::of_file(path)?.read_to_end()
 }
 
-/// Reads a rig from its file.
 pub fn read_rig(path: &Path) -> Result<Rig, Failure> {
     parse_rig(path, &read_text(path)?)
 }
 
-/// Parses a rig from its file's text.
 pub fn parse_rig(path: &Path, text: &str) -> Result<Rig, Failure> {
     Rig::from_toml(text).map_err(|error| rig_complaint(error, path, text))
 }
 
-/// Parses a study from its file's text.
 pub fn parse_study(name: &str, text: &str) -> Result<Study, Failure> {
     Study::from_toml(text).map_err(|error| rig_complaint(error, Path::new(name), text))
 }
 
-/// Reads a locator from its file.
 pub fn read_locator(path: &Path) -> Result<Locator, Failure> {
     parse_locator(path, &read_text(path)?)
 }
 
-/// Parses a locator from its file's text.
 pub fn parse_locator(path: &Path, text: &str) -> Result<Locator, Failure> {
     Locator::from_json(text).map_err(|error| locator_complaint(&error, path, text).into())
 }
 
-/// True for a file name that ends in `.toml`: a rig or a study.
+/// Returns true for a file name that ends in `.toml`: a rig or a study.
 pub fn is_toml(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
 }
 
-/// A rig or a locator. Both contain a bench.
 pub enum RigOrLocator {
     Rig(Box<Rig>),
     Locator(Box<Locator>),
@@ -91,12 +83,11 @@ pub struct RecordingFiles {
 }
 
 impl RecordingFiles {
-    /// The files in these options.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
         [&self.data, &self.contacts].into_iter().flatten().map(PathBuf::as_path)
     }
 
-    /// Reads the recording of this bench, and writes its dialect and its warnings to stderr; `None` without a file.
+    /// Reads the recording of this bench; `None` without a file.
     pub fn read(&self, setup: &Setup) -> Result<Option<Recording>, Failure> {
         let Some(data) = &self.data else { return Ok(None) };
         let Some(contacts) = &self.contacts else { return read_recording(setup, data).map(Some) };
@@ -108,18 +99,16 @@ impl RecordingFiles {
     }
 }
 
-/// Reads a recording of a bench from one file, and writes its dialect and its warnings to stderr.
 pub fn read_recording(setup: &Setup, path: &Path) -> Result<Recording, Failure> {
     read_recording_as(setup, path, &setup.recording_columns())
 }
 
-/// Reads a recording with these columns from one file, and writes its dialect and its warnings to stderr.
 pub fn read_recording_as(setup: &Setup, path: &Path, columns: &Columns) -> Result<Recording, Failure> {
     let (bytes, name) = (read_bytes(path)?, path.display().to_string());
     with_warnings(setup, recording::read(&name, bytes.as_slice(), &setup.schema(columns)), &name)
 }
 
-/// The recording, after its dialect, its warnings and its mismatches with the setup are written to stderr.
+/// Reports dialect, warnings and mismatches with the setup.
 fn with_warnings(
     setup: &Setup,
     recording: Result<Recording, CsvError>,
@@ -133,23 +122,21 @@ fn with_warnings(
     Ok(recording)
 }
 
-/// Writes to stderr how the files of a recording format their tables, if the format differs from the standard one.
+/// Reports a table format that differs from the standard one.
 pub fn say_dialects(recording: &Recording) {
     recording.provenance.dialects.iter().for_each(|dialect| remark!("{}: {dialect}", dialect.source));
 }
 
-/// A length in metres, from a command-line argument.
 pub fn length(text: &str) -> Result<f64, String> {
     greater_than_0(text, Quantity::parse_as(text, Dimension::Length), |length_m| *length_m)
 }
 
-/// A force in newtons, from a command-line argument.
 pub fn force(text: &str) -> Result<f64, String> {
     greater_than_0(text, Quantity::parse_as(text, Dimension::Force), |force_n| *force_n)
 }
 
-/// A frequency in hertz, from a command-line argument. The range gives a period that floating-point times resolve, and finite
-/// multiples of it.
+/// Parses hertz. The range gives a period that floating-point times resolve, and finite multiples
+/// of it.
 pub fn frequency(text: &str) -> Result<f64, String> {
     let frequency_hz =
         greater_than_0(text, Quantity::parse_as(text, Dimension::Frequency), |frequency_hz| *frequency_hz)?;
@@ -160,7 +147,6 @@ pub fn frequency(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A quantity greater than 0 in any unit, from a command-line argument.
 pub fn quantity(text: &str) -> Result<Quantity, String> {
     greater_than_0(text, text.parse::<Quantity>(), |quantity| quantity.value)
 }
@@ -195,7 +181,6 @@ fn locator_complaint(error: &LocatorFileError, path: &Path, text: &str) -> Compl
     complaint.at_line(&path.display().to_string(), line, line_text, start..line_text.len().min(start + 1))
 }
 
-/// The complaint about a recording.
 pub fn csv_complaint(error: &CsvError) -> Complaint {
     match &error.place {
         // The heading above the excerpt states the place.
@@ -209,7 +194,6 @@ pub fn csv_complaint(error: &CsvError) -> Complaint {
     }
 }
 
-/// A number from 0 to 1.
 #[cfg(feature = "live")]
 pub fn share(text: &str) -> Result<f64, String> {
     match text.parse() {
@@ -218,13 +202,11 @@ pub fn share(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A factor by which a clock runs fast.
 #[cfg(feature = "live")]
 pub fn clock_speed() -> clap::builder::RangedI64ValueParser<u32> {
     clap::value_parser!(u32).range(1..=100)
 }
 
-/// A time in seconds, greater than 0.
 pub fn time(text: &str) -> Result<f64, String> {
     match Quantity::parse_as(text, Dimension::Time) {
         Ok(seconds) if seconds > 0.0 && seconds <= 1e9 => Ok(seconds),

@@ -1,14 +1,14 @@
-//! JSON objects written where their values are: keys in the order of the source, no type for each.
+//! JSON objects without a type for each; keys are in the order of the source.
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-/// A JSON object of these keys and values. `"key"?: value` omits the key of a `None`; `..fields` includes the keys of another
-/// object, and no key for a `None`.
+/// A JSON object. `"key"?: value` omits the key of a `None`; `..fields` includes the keys of
+/// another object, none for a `None`.
 macro_rules! object {
     ($($fields:tt)*) => { $crate::json::Object($crate::json::fields!($($fields)*)) };
 }
 
-/// The keys and values of [`object`] alone.
+/// Keys and values of [`object`] without the object.
 macro_rules! fields {
     () => { $crate::json::End };
     (..$fields:expr $(, $($rest:tt)*)?) => { $crate::json::Joined($fields, $crate::json::fields!($($($rest)*)?)) };
@@ -21,18 +21,15 @@ macro_rules! fields {
 }
 pub(crate) use {fields, object};
 
-/// Keys and values of an object, from the first on.
 pub trait Fields {
     fn write<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error>;
 }
 
-/// An object, from its fields.
 pub struct Object<F>(pub F);
 /// A key with its optional value, and the fields after it.
 pub struct Field<V, R>(pub &'static str, pub Option<V>, pub R);
 /// Fields, and the fields after them.
 pub struct Joined<F, R>(pub F, pub R);
-/// No field.
 pub struct End;
 
 impl<F: Fields> Serialize for Object<F> {

@@ -1,4 +1,4 @@
-//! Readings of a file, or of stdin, as they arrive.
+//! Lines and readings of a file or stdin, as they arrive.
 
 use crate::chunks::Chunks;
 use crate::failure::{Complaint, Failure};
@@ -14,37 +14,30 @@ use palpate_mechanics::units::format_count;
 use std::error::Error;
 use std::path::Path;
 
-/// Lines of a source, as they arrive; invalid lines are reported and counted.
+/// Lines of a source; invalid lines are reported and counted.
 pub struct Lines {
-    /// Number of lines read so far.
     pub count: u64,
     source: Chunks,
     decoder: TextDecoder,
-    /// The last chunk, and the number of its bytes that have been taken.
+    /// The last chunk, and the number of consumed bytes.
     chunk: (Vec<u8>, usize),
     line: Vec<u8>,
-    /// True if a CR has ended the last line: a following LF belongs to the same line end.
+    /// True after a line that ends with CR: a following LF belongs to it.
     after_cr: bool,
-    /// Lines with values.
     parsed: u64,
-    /// Invalid lines.
     lost: u64,
     records: Records,
 }
 
-/// Records of invalid lines.
+/// Records of invalid lines on stdout.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Records {
-    /// No record on stdout: valid lines have their line numbers.
     None,
-    /// A JSON object on stdout.
     Json,
 }
 
-/// Largest number of messages about skipped lines on stderr, as hundreds of similar messages are useless.
 const MOST_SKIPS: u64 = 20;
 
-/// Largest number of bytes in a line.
 pub const MOST_BYTES: usize = 1 << 20;
 
 /// A line longer than [`MOST_BYTES`].
@@ -53,7 +46,6 @@ pub const MOST_BYTES: usize = 1 << 20;
 pub struct TooLong;
 
 impl Lines {
-    /// The lines of a file; `-` is stdin.
     pub fn open(path: &Path, records: Records) -> Result<Self, Failure> {
         let source = Chunks::open(path)?;
         Ok(Self {
@@ -69,15 +61,14 @@ impl Lines {
         })
     }
 
-    /// Name of the source.
     pub fn name(&self) -> &str {
         &self.source.name
     }
 
-    /// The next line, with its line end, which is LF, CR or CRLF; `None` after the last.
+    /// Returns the next line with its end: LF, CR or CRLF.
     ///
     /// # Errors
-    /// A complaint if the source cannot be read, and [`Failure::Interrupted`] after a signal.
+    /// A complaint if the source cannot be read; [`Failure::Interrupted`] after a signal.
     pub fn next(&mut self) -> Result<Option<Result<&[u8], TooLong>>, Failure> {
         self.line.clear();
         let mut length = 0;
@@ -114,7 +105,6 @@ impl Lines {
         Ok(Some(if length <= MOST_BYTES { Ok(&self.line) } else { Err(TooLong) }))
     }
 
-    /// Counts an invalid line, and reports the reason.
     pub fn lose(&mut self, error: &(dyn Error + 'static)) -> Result<(), Failure> {
         self.lost += 1;
         // An error of a parser contains source and line.
@@ -135,12 +125,11 @@ impl Lines {
         output::say_json_line(&object! { "line": self.count, "column"?: column, "skipped": reason })
     }
 
-    /// True while every line has been valid.
     pub fn is_whole(&self) -> bool {
         self.lost == 0
     }
 
-    /// Failure if some lines gave no `answer`, or if no line contains a reading.
+    /// Fails if some lines gave no `answer`, or if no line contains a reading.
     pub fn finish(&self, answer: &str) -> Result<(), Failure> {
         match self.lost {
             0 if self.parsed == 0 => {
@@ -152,7 +141,6 @@ impl Lines {
     }
 }
 
-/// Adds the number of the last line to an interruption; other failures stay as they are.
 fn stopped_after(failure: Failure, line: u64) -> Failure {
     match failure {
         Failure::Interrupted(_) => Failure::Interrupted(format!("stopped after line {line}")),
@@ -160,12 +148,10 @@ fn stopped_after(failure: Failure, line: u64) -> Failure {
     }
 }
 
-/// The dialect of a stream in the last message on stderr.
 #[derive(Default)]
 struct DialectNote(String);
 
 impl DialectNote {
-    /// Writes the dialect to stderr if it has changed.
     fn say(&mut self, dialect: &Dialect) {
         let words = dialect.to_string();
         if words != self.0 {
@@ -175,7 +161,7 @@ impl DialectNote {
     }
 }
 
-/// Values of lines, by a parser; invalid lines are reported and counted.
+/// Parsed values of lines; invalid lines are reported and counted.
 pub struct Parsing<P> {
     pub parser: P,
     header: Header,
@@ -183,12 +169,12 @@ pub struct Parsing<P> {
 }
 
 impl<P: LineParser> Parsing<P> {
-    /// Values by a parser, of lines with or without a header.
+    /// Parses lines with or without a header.
     pub fn new(parser: P, header: Header) -> Self {
         Self { parser, header, note: DialectNote::default() }
     }
 
-    /// The values of the next line, `Some(None)` for a line without values; `None` after the last line.
+    /// Returns the values of the next line: `None` at the end, `Some(None)` without values.
     pub fn next(&mut self, lines: &mut Lines) -> Result<Option<Option<P::Parsed>>, Failure> {
         let Some(line) = lines.next()? else {
             let unfound = self.parser.progress().unfound();
@@ -203,7 +189,7 @@ impl<P: LineParser> Parsing<P> {
                 return Ok(Some(parsed));
             }
             Ok(Err(error)) => {
-                // The first line of a stream without a header may be incomplete, as the stream may have begun earlier.
+                // A stream without a header may begin within a line.
                 let may_be_torn = self.header == Header::Absent && lines.is_whole();
                 if self.parser.progress().awaits_columns() && !may_be_torn {
                     return Err(input::csv_complaint(&error).into());
@@ -223,14 +209,13 @@ impl<P: LineParser> Parsing<P> {
     }
 }
 
-/// The readings of a file, one per line.
 pub struct Readings {
     pub lines: Lines,
     parsing: Parsing<ReadingParser>,
 }
 
 impl Readings {
-    /// The readings of a bench in lines. Without a header, the columns are the channels in their order.
+    /// Without a header, the columns are the channels in order.
     pub fn new(lines: Lines, setup: &Setup, no_header: bool) -> Self {
         let mut columns: Columns = setup.recording_columns();
         if no_header {
@@ -244,7 +229,6 @@ impl Readings {
         Self { lines, parsing: Parsing::new(parser, columns.header) }
     }
 
-    /// The next reading.
     pub fn next(&mut self) -> Result<Option<Vec<f64>>, Failure> {
         while let Some(parsed) = self.parsing.next(&mut self.lines)? {
             if parsed.is_some() {
@@ -259,7 +243,7 @@ impl Readings {
         self.parsing.parser.time_s()
     }
 
-    /// True until the columns are known, by a header or by `--no-header`.
+    /// Returns true until a header or `--no-header` defines the columns.
     pub fn awaits_columns(&mut self) -> bool {
         self.parsing.parser.progress().awaits_columns()
     }

@@ -36,7 +36,6 @@ use palpate_live::login::without_passwords;
 use std::io::Write;
 use std::process::ExitCode;
 
-/// Examples and exit codes in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Write a first rig for a recording of presses
@@ -142,7 +141,6 @@ fn main() -> ExitCode {
     }
 }
 
-/// Prints help, version, or a complaint about the arguments.
 fn answer(error: &clap::Error) -> ExitCode {
     let text = error.to_string();
     let shown = without_passwords(&text);
@@ -163,7 +161,7 @@ fn answer(error: &clap::Error) -> ExitCode {
     }
 }
 
-/// The text, as a command without sources has no passwords.
+/// Returns the text unchanged: a command without sources has no passwords.
 #[cfg(not(feature = "live"))]
 fn without_passwords(text: &str) -> String {
     text.to_owned()

@@ -8,7 +8,6 @@ use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
-/// Prints the path of the report in a folder, if there is one, with `before` in front of it.
 pub fn say_report(before: &str, folder: Option<&Path>) -> Result<(), Failure> {
     match folder {
         Some(folder) => say(format!("{before}Report: {}", folder.join("report.html").display())),
@@ -16,27 +15,23 @@ pub fn say_report(before: &str, folder: Option<&Path>) -> Result<(), Failure> {
     }
 }
 
-/// Prints a line on stdout.
 pub fn say(line: impl Display) -> Result<(), Failure> {
     print(&mut std::io::stdout().lock(), format!("{line}\n").as_bytes())
 }
 
-/// Prints a value as JSON on stdout.
 pub fn say_json(value: &impl serde::Serialize) -> Result<(), Failure> {
     say(to_json(value)?)
 }
 
-/// Prints a value as a line of JSON on stdout.
 pub fn say_json_line(value: &impl serde::Serialize) -> Result<(), Failure> {
     say(serde_json::to_string(value).map_err(Complaint::new)?)
 }
 
-/// A value as JSON text.
 pub fn to_json(value: &impl serde::Serialize) -> Result<String, Failure> {
     serde_json::to_string_pretty(value).map_err(|error| Complaint::new(error).into())
 }
 
-/// Writes to stdout or its replacement; a closed reader is not an error of ours.
+/// Writes to stdout or its replacement; a closed reader is not an error.
 pub fn print(out: &mut impl Write, bytes: &[u8]) -> Result<(), Failure> {
     if stdout::was_closed() {
         return Err(closed());
@@ -49,7 +44,7 @@ pub fn flush(out: &mut impl Write) -> Result<(), Failure> {
     out.flush().map_err(|error| unprinted(&error))
 }
 
-/// The failure of a write to stdout: its reader has closed it, which is not an error of ours, or it is full.
+/// Failure of a write to stdout; a closed reader is not an error.
 pub fn unprinted(error: &std::io::Error) -> Failure {
     match error.kind() {
         ErrorKind::BrokenPipe => Failure::NobodyReads,
@@ -57,12 +52,11 @@ pub fn unprinted(error: &std::io::Error) -> Failure {
     }
 }
 
-/// The failure of a write to a stdout that was closed at the start.
 pub fn closed() -> Failure {
     Complaint::new("cannot write to stdout: it is closed").into()
 }
 
-/// A text table, made column by column; the columns after the first are aligned to the right.
+/// A text table; the columns after the first are aligned to the right.
 pub struct Table<R> {
     rows: Vec<R>,
     heading: Vec<String>,
@@ -75,14 +69,12 @@ impl<R> Table<R> {
         Self { cells: vec![Vec::new(); rows.len()], heading: Vec::new(), rows }
     }
 
-    /// Adds a column with its cell for each row.
     pub fn column(mut self, heading: impl Into<String>, cell: impl Fn(&R) -> String) -> Self {
         self.heading.push(heading.into());
         self.cells.iter_mut().zip(&self.rows).for_each(|(cells, row)| cells.push(cell(row)));
         self
     }
 
-    /// Adds a row of another kind.
     pub fn row(mut self, cells: Vec<String>) -> Self {
         self.cells.push(cells);
         self
@@ -101,7 +93,8 @@ impl<R> Display for Table<R> {
     }
 }
 
-/// Three decimals, or a whole number if it has many digits before the point; a dash for `None`.
+/// Formats three decimals, or a whole number if it has many digits before the point; a dash for
+/// `None`.
 pub fn figure(value: Option<f64>) -> String {
     match value {
         None => "–".to_owned(),

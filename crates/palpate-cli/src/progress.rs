@@ -1,4 +1,4 @@
-//! Progress of long work: a bar with rate and remaining time on a terminal, no output in a pipe; and Ctrl-C, which stops the work.
+//! Progress bars on a terminal, and signals that stop long work.
 
 use crate::remark::{alert, is_quiet};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -10,23 +10,22 @@ use std::time::{Duration, Instant};
 
 /// Number of the received signal; 0 for none. Signal handlers write it.
 static SIGNAL: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
-/// The process ends this long after a signal if the work has not ended by itself.
+/// Time from a signal to a forced end of the process.
 const PATIENCE: Duration = Duration::from_millis(700);
-/// True if the command finishes its work after a signal.
 static FINISHES: AtomicBool = AtomicBool::new(false);
-/// SIGINT, which Ctrl-C sends.
 const INTERRUPT: usize = 2;
 
-/// Makes Ctrl-C (and SIGTERM, or a closed terminal) ask long work to stop. The process ends soon after, even if the work has not
-/// ended: all files that palpate writes are complete at any time. See [`finish_after_signal`] for work that must not be cut off.
+/// Lets Ctrl-C, SIGTERM or a closed terminal stop long work. The process ends soon after in any
+/// case: all written files are complete at any time. See [`finish_after_signal`] for work that must
+/// not be cut off.
 pub fn install_signal_handler() {
     if let Err(error) = begin_to_listen() {
         alert!("Ctrl-C will end palpate at once: {error}");
     }
 }
 
-/// Signals that ask a process to end. They need a real handler: signals that are only blocked reach the threads of serial ports,
-/// where `ppoll` opens them.
+/// Signals that ask a process to end. They need a real handler: signals that are only blocked reach
+/// the threads of serial ports, where `ppoll` unblocks them.
 #[cfg(unix)]
 fn ends() -> Vec<i32> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM};
@@ -38,7 +37,7 @@ fn ends() -> Vec<i32> {
     ends
 }
 
-/// True if the process was started with a signal ignored, as Linux reports in hexadecimal.
+/// Returns true if the process was started with a signal ignored, as Linux reports in hexadecimal.
 #[cfg(unix)]
 fn ignores(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -80,7 +79,8 @@ fn begin_to_listen() -> Result<(), Box<dyn Error>> {
     })?)
 }
 
-/// Sets a flag at once if a signal asks the process to end or to be suspended: a machine must not continue unwatched.
+/// Sets a flag at once if a signal asks the process to end or to be suspended: a machine must not
+/// continue unwatched.
 #[cfg(all(feature = "live", unix))]
 pub fn set_at_signal(flag: &Arc<AtomicBool>) -> std::io::Result<()> {
     for signal in ends().into_iter().chain([signal_hook::consts::SIGTSTP]) {
@@ -95,19 +95,18 @@ pub fn set_at_signal(_: &Arc<AtomicBool>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Lets the command finish its work after a first signal: close a recording, lift a machine. A second signal ends the process.
+/// Lets the command finish its work after a first signal: close a recording, lift a machine. A
+/// second signal ends the process.
 #[cfg(feature = "live")]
 pub fn finish_after_signal() {
     FINISHES.store(true, Ordering::Relaxed);
 }
 
-/// Ends the process if the work does not end.
 fn end() {
     alert!("palpate: stopped");
     std::process::exit(interrupted_code().into());
 }
 
-/// True after Ctrl-C or a request that the process ends.
 pub fn interrupted() -> bool {
     SIGNAL.load(Ordering::Relaxed) != 0
 }
@@ -121,7 +120,6 @@ pub fn interrupted_code() -> u8 {
     128 + signal as u8
 }
 
-/// Template of a bar on stderr; and of one with the elapsed time, for work of unknown length.
 const OF_LENGTH: &str = "{msg} {wide_bar} {pos}/{len}  {prefix}";
 const OF_ANY_LENGTH: &str = "{msg} {spinner} {prefix} {elapsed} so far";
 
@@ -152,7 +150,6 @@ struct State {
     start: Instant,
 }
 
-/// Steps of the bar in a whole stage.
 const STAGE_STEPS: f64 = 1000.0;
 
 impl Observer {
@@ -161,7 +158,7 @@ impl Observer {
         Self::new(bar(most, "fitting"))
     }
 
-    /// Observer of work that reports stages; the bar begins anew with every stage.
+    /// Observer of work that reports stages; the bar restarts with every stage.
     pub fn of_stages() -> Self {
         Self::new(bar(STAGE_STEPS as u64, "beginning"))
     }
@@ -170,12 +167,10 @@ impl Observer {
         Self { bar, state: Mutex::new(State { rounds: 0, stage: "", start: Instant::now() }) }
     }
 
-    /// Does some work with this observer.
     pub fn watch<T>(&self, work: impl FnOnce(Watch) -> T) -> T {
         work(Watch::new(&|progress| self.observe(progress)))
     }
 
-    /// Shows progress; false after Ctrl-C.
     fn observe(&self, progress: Progress) -> bool {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         match progress {
@@ -224,7 +219,6 @@ impl Observer {
         }
     }
 
-    /// Restarts the bar with every stage.
     fn begin(&self, state: &mut State, name: &'static str, length: u64) {
         if state.stage != name {
             state.stage = name;
@@ -238,7 +232,6 @@ impl Observer {
     }
 }
 
-/// A rate with two or more digits.
 fn per_second(rate: f64) -> String {
     if rate < 10.0 { format!("{rate:.1}") } else { format!("{rate:.0}") }
 }
@@ -249,7 +242,6 @@ impl Drop for Observer {
     }
 }
 
-/// "1 min 20 s"
 pub fn duration(seconds: f64) -> String {
     let seconds = seconds.max(0.0).round() as u64;
     match (seconds / 3600, seconds / 60 % 60, seconds % 60) {

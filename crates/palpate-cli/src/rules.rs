@@ -7,7 +7,7 @@ use palpate_live::rules::Rules;
 use palpate_mechanics::surface::Extent;
 use std::path::Path;
 
-/// The rules of a file for a surface of this extent; none without a file.
+/// Reads the rules of a file for a surface of this extent; none without a file.
 pub fn read(path: Option<&Path>, extent: Extent) -> Result<Rules, Failure> {
     let Some(path) = path else { return Ok(Rules::default()) };
     let text = input::read_text(path)?;
@@ -17,7 +17,7 @@ pub fn read(path: Option<&Path>, extent: Extent) -> Result<Rules, Failure> {
     })?)
 }
 
-/// Refuses rules that ask for a force, where the locator tells none: they would never act.
+/// Rejects rules about a force that the locator does not estimate.
 pub fn refuse_untold_forces(rules: &Rules, path: &Path, locator: &Locator) -> Result<(), Failure> {
     if locator.tells_force() {
         return Ok(());
@@ -32,7 +32,6 @@ pub fn refuse_untold_forces(rules: &Rules, path: &Path, locator: &Locator) -> Re
     Err(complaint.help("remove `force`, or fit an estimator of the force, such as `influence`").into())
 }
 
-/// Refuses rules that publish, where there is no broker.
 pub fn refuse_publishing(publishing: &Rules, path: &Path, help: &str) -> Result<(), Failure> {
     let Some(rule) = publishing.as_slice().first() else { return Ok(()) };
     let complaint =

@@ -1,4 +1,4 @@
-//! Options of a live session, common to all verbs that have one.
+//! Options of all verbs with a live session.
 
 use crate::failure::{Complaint, Failure};
 use crate::input;
@@ -29,7 +29,6 @@ pub struct SessionOptions {
 }
 
 impl SessionOptions {
-    /// The configuration of the session.
     pub fn config(&self) -> SessionConfig {
         let estimation = match (self.low_pass, self.track) {
             (Some(cutoff_hz), _) => Estimation::LowPass { cutoff_hz },
@@ -43,7 +42,6 @@ impl SessionOptions {
         SessionConfig { estimation, ..SessionConfig::default() }
     }
 
-    /// A session of a locator from the file at `path`.
     pub fn session<'a>(&self, locator: &'a Locator, path: &Path) -> Result<Session<'a>, Failure> {
         Session::new(locator, &self.config()).map_err(|error| {
             Complaint::about(path, error)
@@ -52,7 +50,6 @@ impl SessionOptions {
         })
     }
 
-    /// Checks that the options fit the source of the readings.
     pub fn check_source(&self, from: &SourceUrl) -> Result<(), Failure> {
         pipeline::check_pace(&self.config().estimation, from)
             .map_err(|error| Complaint::new(format!("--from {from}: {error}")).into())

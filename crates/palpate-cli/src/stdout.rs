@@ -1,13 +1,13 @@
-//! Stdout at the start of the process.
+//! State of stdout at the start of the process.
 //!
-//! The standard library opens `/dev/null` in the place of a closed stdout before `main` runs, and answers written there are lost without
-//! an error. An initializer of the program looks at stdout before that.
+//! The standard library replaces a closed stdout by `/dev/null` before `main`, and output is lost
+//! without an error. An initializer of the program checks stdout before that.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 static WAS_CLOSED: AtomicBool = AtomicBool::new(false);
 
-/// True if the process was started without stdout, as by `palpate … >&-`.
+/// Returns true if the process was started without stdout, as by `palpate … >&-`.
 pub fn was_closed() -> bool {
     WAS_CLOSED.load(Ordering::Relaxed)
 }

@@ -1,6 +1,6 @@
-//! CSV tables beside a report: the data of its figures, for the reader's own plots.
+//! CSV tables beside a report: the data of its figures.
 //!
-//! The first line is a comment that states version, inputs and seed; column names contain their units.
+//! The first line is a comment with version, inputs and seed; column names contain units.
 
 use crate::failure::Failure;
 use crate::target::TargetFolder;
@@ -10,39 +10,33 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use std::collections::BTreeMap;
 
-/// The file with the errors of each position.
 pub const ERRORS_CSV: &str = "errors.csv";
 
-/// A table of named columns.
 pub struct CsvTable {
     text: String,
 }
 
 impl CsvTable {
-    /// A table with the comment line `comment` and these columns.
     pub fn new(comment: &str, columns: impl IntoIterator<Item = impl AsRef<str>>) -> Self {
         let comment = comment.replace(['\r', '\n'], " ");
         Self { text: format!("# palpate {}, {comment}\n{}", env!("CARGO_PKG_VERSION"), csv_row(columns)) }
     }
 
-    /// Adds a row.
     pub fn row(&mut self, cells: impl IntoIterator<Item = impl AsRef<str>>) {
         self.text += &csv_row(cells);
     }
 
-    /// Writes the table into a folder.
     pub fn write(&self, folder: &TargetFolder, name: &str) -> Result<(), Failure> {
         folder.write(name, self.text.as_bytes())
     }
 }
 
-/// A number with nine digits, without trailing zeros; an empty cell for `None`.
+/// Formats nine digits without trailing zeros; an empty cell for `None`.
 pub fn cell(value: Option<f64>) -> String {
     let nine = |value: f64| -> f64 { format!("{value:.8e}").parse().unwrap_or(value) };
     value.filter(|value| value.is_finite()).map_or_else(String::new, |value| nine(value).to_string())
 }
 
-/// Names of the columns of a position.
 pub fn position_columns(extent: Extent) -> Vec<&'static str> {
     match extent {
         Extent::Line { .. } => vec!["position_mm"],
@@ -50,12 +44,12 @@ pub fn position_columns(extent: Extent) -> Vec<&'static str> {
     }
 }
 
-/// Cells of a position.
 pub fn position_cells(position: Position, extent: Extent) -> Vec<String> {
     extent.coordinates_m(position).map(|at_m| cell(Some(at_m * 1e3))).collect()
 }
 
-/// Columns of errors in millimetres and newtons, and of the shares of the 95 % regions and of the force's 95 % intervals that contain their contact.
+/// Columns of errors in millimetres and newtons, and of the coverage of 95 % regions and force
+/// intervals.
 pub const ERROR_COLUMNS: [&str; 9] = [
     "readings",
     "mean_error_mm",
@@ -68,7 +62,6 @@ pub const ERROR_COLUMNS: [&str; 9] = [
     "force_covered_percent",
 ];
 
-/// Cells of [`ERROR_COLUMNS`].
 pub fn error_cells(evaluation: &Evaluation) -> Vec<String> {
     let Some(errors) = evaluation.summary(None) else { return vec![String::new(); ERROR_COLUMNS.len()] };
     let figures_m = [errors.average_m, errors.median_m, errors.p95_m, errors.rmse_m, errors.largest_m];
@@ -81,13 +74,12 @@ pub fn error_cells(evaluation: &Evaluation) -> Vec<String> {
     cells
 }
 
-/// Share of the answers with each status in %, by its name; `None` if statuses were not kept.
+/// Share of the answers with each status in %; `None` if statuses were not kept.
 pub fn status_percents(evaluation: &Evaluation) -> Option<BTreeMap<&'static str, f64>> {
     let percents = evaluation.status_percents()?;
     Some(percents.into_iter().map(|(status, percent)| (status.name(), percent)).collect())
 }
 
-/// Errors of estimated forces, in JSON.
 #[derive(serde::Serialize)]
 pub struct ForceErrors {
     count: usize,
@@ -98,7 +90,6 @@ pub struct ForceErrors {
     coverage_95: f64,
 }
 
-/// The errors of estimated forces; `None` if there are none.
 pub fn force_errors(evaluation: &Evaluation) -> Option<ForceErrors> {
     evaluation.force_summary().map(|forces| ForceErrors {
         count: forces.count,
@@ -110,7 +101,6 @@ pub fn force_errors(evaluation: &Evaluation) -> Option<ForceErrors> {
     })
 }
 
-/// The files of a recording with their digests, in words.
 pub fn source_in_words(provenance: &Provenance) -> String {
     let digests = provenance.digests.iter().map(|digest| format!(" sha256 {digest}"));
     format!("{}{}", provenance.source, digests.collect::<String>())

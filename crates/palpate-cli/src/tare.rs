@@ -1,4 +1,4 @@
-//! `--tare`: readings of a surface with offsets that have moved since its calibration.
+//! `--tare`: correction of readings for offsets that have changed since the calibration.
 
 use crate::failure::{Complaint, Failure};
 use crate::input::{self, RecordingFiles};
@@ -27,7 +27,6 @@ pub struct TareOption {
 }
 
 impl TareOption {
-    /// The file in the option.
     pub fn path(&self) -> Option<&Path> {
         match &self.tare {
             Some(Source::File(path)) => Some(path),
@@ -35,8 +34,8 @@ impl TareOption {
         }
     }
 
-    /// The tare of readings in use: by default `last` if the calibration has `zero = "last"` and untouched readings can be
-    /// detected.
+    /// Returns the tare in use; `last` is the default if the calibration has `zero = "last"` and
+    /// untouched readings can be detected.
     pub fn in_use(&self, locator: &Locator) -> Self {
         let is_last = locator.setup.recording_columns().zero == Zero::Last;
         let default = || Source::Last { first: Start::NONE };
@@ -44,12 +43,10 @@ impl TareOption {
         Self { tare: self.tare.clone().or(by_locator) }
     }
 
-    /// Words that follow a description of the evaluated readings.
     pub fn in_words(&self) -> &'static str {
         if self.tare.is_some() { ", tared" } else { "" }
     }
 
-    /// Refuses a tare without a recording.
     pub fn check_recorded(&self, files: &RecordingFiles) -> Result<(), Failure> {
         if self.tare.is_some() && files.data.is_none() {
             let complaint = Complaint::new("--tare needs a recording: simulated calibrations start at zero");
@@ -58,7 +55,6 @@ impl TareOption {
         Ok(())
     }
 
-    /// Refuses a tare of simulated readings, unless the bench has imperfections.
     pub fn check_drifts(&self, files: &RecordingFiles, setup: &Setup) -> Result<(), Failure> {
         if self.tare.is_some() && files.data.is_none() && setup.imperfections().is_none() {
             let complaint = Complaint::new("--tare: simulated readings do not drift");
@@ -68,36 +64,29 @@ impl TareOption {
     }
 }
 
-/// The untouched readings.
+/// Source of untouched readings.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source {
-    /// The first readings.
     First(Start),
-    /// All readings of a file.
     File(PathBuf),
-    /// The first readings, and later ones that the locator's own rule detects as untouched.
+    /// The first readings, and later ones that the locator detects as untouched.
     Auto {
-        /// Readings at the beginning that are known to be untouched.
         first: Start,
     },
-    /// The first readings, and then the latest one that the locator's own rule detects as untouched.
+    /// The first readings, and then the latest one that the locator detects as untouched.
     Last {
-        /// Readings at the beginning that are known to be untouched.
         first: Start,
     },
 }
 
-/// Beginning of a stream of readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start {
-    /// A number of readings.
     Readings(u64),
-    /// The readings within this time from the start, in seconds.
+    /// Time from the start, in seconds.
     Seconds(f64),
 }
 
 impl Start {
-    /// No reading.
     const NONE: Self = Self::Readings(0);
 }
 
@@ -128,7 +117,6 @@ impl FromStr for Start {
 }
 
 impl Source {
-    /// Readings at the beginning that are known to be untouched.
     fn first(&self) -> Start {
         match self {
             Self::First(first) | Self::Auto { first } | Self::Last { first } => *first,
@@ -136,7 +124,6 @@ impl Source {
         }
     }
 
-    /// The word of the option for a baseline that is updated.
     fn followed(&self) -> Option<&'static str> {
         match self {
             Self::Auto { .. } => Some("auto"),
@@ -173,56 +160,47 @@ impl FromStr for Source {
     }
 }
 
-/// Use of a reading for the tare.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Taken {
-    /// A reading of the baseline: it is not located.
     Baseline,
-    /// A tared reading.
     Tared,
     /// A tared reading, with its estimate by the tare that updates the baseline.
     Located(Box<Estimate>),
 }
 
-/// A reading that the tare cannot use.
 #[derive(Debug, thiserror::Error)]
 pub enum TakeError {
-    /// A reading with other channels or invalid values.
     #[error(transparent)]
     Tare(#[from] TareError),
-    /// A reading without a time, when the baseline is given in seconds.
     #[error(
         "the reading has no time, and --tare takes those of the first {0} s: name the column as `time` in [recording], or give a number of readings"
     )]
     NoTime(f64),
 }
 
-/// The tare of a stream of readings.
 pub struct Taring<'a> {
     locator: &'a Locator,
     source: Source,
     tare: Tare<Vec<f64>>,
     /// True until the end of the readings that are known to be untouched.
     is_beginning: bool,
-    /// Time of the first reading.
     begun_s: Option<f64>,
-    /// Number of readings at the beginning.
     first: u64,
-    /// Number of readings in the baseline; if it is updated, number of detected untouched readings.
+    /// Number of readings in an unchanging baseline, or of detected untouched readings.
     count: u64,
     /// Number of readings that are `outside_model` with an updated baseline.
     unexplained: u64,
-    /// The first readings of the baseline, to check that they are untouched.
+    /// First readings of the baseline, to check that they are untouched.
     kept: Vec<Vec<f64>>,
     tared: Vec<f64>,
 }
 
-/// Largest number of baseline readings that are checked, and the largest share of them that may appear touched.
+/// Largest number of checked baseline readings, and largest share of them that may appear touched.
 const MOST_KEPT: usize = 1000;
 const MOST_TOUCHED: f64 = 0.05;
 
 impl<'a> Taring<'a> {
-    /// The requested tare; `None` without one. A FILE is read at once.
+    /// Reads the requested tare and its FILE; `None` without one.
     pub fn new(option: &TareOption, locator: &'a Locator, no_header: bool) -> Result<Option<Self>, Failure> {
         let Some(source) = option.tare.clone() else { return Ok(None) };
         let tare = locator.tare().map_err(|error| {
@@ -279,7 +257,6 @@ impl<'a> Taring<'a> {
         Ok(())
     }
 
-    /// Takes a reading with its time in seconds, and replaces it by the tared one.
     pub fn take(&mut self, reading: &mut [f64], time_s: Option<f64>) -> Result<Taken, TakeError> {
         if let Some(time_s) = time_s {
             self.tare.note_time(time_s);
@@ -311,7 +288,6 @@ impl<'a> Taring<'a> {
         Ok(taken)
     }
 
-    /// True for a reading that is known to be untouched.
     fn is_of_beginning(&mut self, time_s: Option<f64>) -> Result<bool, TakeError> {
         match self.source.first() {
             Start::Readings(first) => Ok(self.count < first),
@@ -337,7 +313,7 @@ impl<'a> Taring<'a> {
         Ok(())
     }
 
-    /// Reports the baseline, and warns if its readings do not look untouched relative to their mean.
+    /// Reports the baseline, and warns if its readings vary like touched ones.
     fn look_again(&mut self) {
         self.say();
         if self.locator.false_alarm_rate().is_none() {
@@ -358,7 +334,6 @@ impl<'a> Taring<'a> {
         }
     }
 
-    /// Reports how far the channels have moved.
     fn say(&self) {
         let moved = self.tare.baseline().iter().zip(self.tare.learnt()).map(|(today, learnt)| today - learnt);
         let most = moved.enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
@@ -375,7 +350,7 @@ impl<'a> Taring<'a> {
         remark!("palpate: tare from {from}; {} has moved most, by {moved}", sensor.name);
     }
 
-    /// Reports an updated baseline, and warns if too few readings were untouched.
+    /// Reports an updated baseline, and warns of too few untouched readings.
     fn say_followed(&self, followed: &str, source: &str) {
         if self.count > 0 {
             self.say();
@@ -399,7 +374,7 @@ impl<'a> Taring<'a> {
     /// Ends the readings of `source`.
     ///
     /// # Errors
-    /// A failure if there were fewer readings than the baseline needs.
+    /// A failure if the baseline needs more readings.
     pub fn finish(&self, source: &str) -> Result<(), Failure> {
         if self.is_beginning {
             let needed = self.source.first();
@@ -416,8 +391,8 @@ impl<'a> Taring<'a> {
     }
 }
 
-/// Corrects held-out readings for the drift of the offsets that the training presses of their folds show. Without a requested tare,
-/// a warning reports how far the channels drift.
+/// Corrects held-out readings for the drift in the training presses of their folds. Without a
+/// requested tare, a warning reports the drift.
 pub fn tare_splits(
     option: &TareOption,
     setup: &Setup,
@@ -459,7 +434,6 @@ pub fn tare_splits(
     Ok(())
 }
 
-/// Reports how far the channels drift, if held-out readings are corrected for it.
 pub fn say_drift(setup: &Setup, spans: &[f64]) {
     remark!("palpate: {}; it is subtracted from held-out readings", moved_most(setup, spans));
 }
@@ -475,7 +449,7 @@ fn moved_most(setup: &Setup, spans: &[f64]) -> String {
     format!("the channels drift during the recording, {} by {moved}", sensor.name)
 }
 
-/// A recording with readings tared as in `palpate locate`; the readings of the baseline are omitted.
+/// Tares the readings of a recording as in `palpate locate`, and omits those of the baseline.
 pub fn tared_recording(
     option: &TareOption,
     locator: &Locator,

@@ -1,4 +1,5 @@
-//! Files and folders that a command may write: overwriting of data is refused with a reason, and files appear complete.
+//! Files and folders that a command may write. Data is not overwritten by mistake, and files appear
+//! complete.
 
 use crate::failure::{Complaint, Failure};
 use palpate_files::{self as whole_file, folder_of};
@@ -9,23 +10,19 @@ use std::path::{Path, PathBuf};
 
 /// Results of a study; the study is finished once the file exists.
 pub const RESULTS_JSON: &str = "results.json";
-/// Fits of a study, with its networks.
 pub const NETWORKS_CSV: &str = "networks.csv";
-/// Located contacts of a study's fits other than networks.
 pub const EVALUATIONS_CSV: &str = "evaluations.csv";
 /// Facts of a study's shard; the shard is finished once the file exists.
 pub const SHARD_JSON: &str = "shard.json";
-/// Page of a report.
 pub const REPORT_HTML: &str = "report.html";
-/// Files that mark a folder as a study's.
 pub const OF_A_STUDY: [&str; 4] = [RESULTS_JSON, SHARD_JSON, NETWORKS_CSV, EVALUATIONS_CSV];
 
-/// The files that a command reads, and those that its own output goes to. The command must not overwrite them.
+/// Files that a command reads, or that its output is redirected to, and must not overwrite.
 #[derive(Clone, Debug)]
 pub struct Inputs(Vec<(&'static str, Identity)>);
 
 impl Inputs {
-    /// The files at these paths; `-` is stdin. A path without a file is left to its reader.
+    /// Identifies the files at these paths; `-` is stdin. Paths without a file are omitted.
     pub fn new<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Self {
         let read =
             paths.into_iter().filter_map(Identity::look_up).map(|file| ("this command reads it", file));
@@ -45,7 +42,8 @@ impl Inputs {
     }
 }
 
-/// Identity of a file under any name: the path without links, and the inode, which hard links share.
+/// Identity of a file under any name: the path without links, and the inode, which hard links
+/// share.
 #[derive(Clone, Debug)]
 struct Identity {
     path: PathBuf,
@@ -53,7 +51,6 @@ struct Identity {
 }
 
 impl Identity {
-    /// Identity of a regular file; `None` for anything else.
     fn look_up(path: &Path) -> Option<Self> {
         let there = fs::metadata(path).ok().filter(Metadata::is_file)?;
         Some(Self { path: fs::canonicalize(path).ok()?, inode: inode(&there) })
@@ -75,7 +72,6 @@ fn inode(_: &Metadata) -> Option<(u64, u64)> {
     None
 }
 
-/// A file that may be written.
 #[derive(Clone, Debug)]
 pub struct Target {
     path: PathBuf,
@@ -83,7 +79,7 @@ pub struct Target {
 }
 
 impl Target {
-    /// Complains at once, before any work, if the file must not or cannot be written.
+    /// Fails before any work if the file must not or cannot be written.
     pub fn new(path: &Path, inputs: &Inputs) -> Result<Self, Failure> {
         let target = Self { path: path.to_owned(), inputs: inputs.clone() };
         let place = target.place()?;
@@ -102,14 +98,13 @@ impl Target {
         &self.path
     }
 
-    /// Writes the file under a temporary name and renames it, so that it is never seen incomplete. A link stays, and its target is
-    /// written; a replaced file keeps its mode.
+    /// Writes a temporary file and renames it, so that readers see complete files only. Links and
+    /// the mode of a replaced file are kept.
     pub fn write(&self, bytes: &[u8]) -> Result<(), Failure> {
         self.place()?;
         whole_file::write(&self.path, bytes).map_err(|error| cannot("write", &self.path, &error))
     }
 
-    /// The file to write, with all links followed.
     fn place(&self) -> Result<PathBuf, Failure> {
         let refused = |why: &str| Complaint::new(format!("cannot write {}: {why}", self.path.display()));
         if self.path == Path::new("-") {
@@ -141,13 +136,13 @@ impl Target {
     }
 }
 
-/// Another file of the study to which the file at `place` belongs, if both exist.
+/// Returns another file of the study to which the file at `place` belongs.
 fn result_beside(place: &Path) -> Option<&'static str> {
     let name = place.file_name()?.to_str().filter(|name| is_of_a_report(name) && place.exists())?;
     OF_A_STUDY.into_iter().find(|other| *other != name && place.with_file_name(other).exists())
 }
 
-/// The reason why no command may replace an entry of a folder by a file; `None` for a regular file.
+/// Returns why an entry of a folder must not be replaced; `None` for a regular file.
 fn reason_against(there: &Metadata) -> Option<&'static str> {
     match there.file_type() {
         kind if kind.is_dir() => Some("it is a folder"),
@@ -172,7 +167,6 @@ fn what_it_is(_: &Metadata) -> &'static str {
     "it is not a regular file"
 }
 
-/// A folder that takes a report, with all files that belong to it.
 #[derive(Clone, Debug)]
 pub struct TargetFolder {
     path: PathBuf,
@@ -180,7 +174,7 @@ pub struct TargetFolder {
 }
 
 impl TargetFolder {
-    /// A folder for the report of a command; a folder with the results of a study is refused.
+    /// Prepares a folder for a report, and refuses one with results of a study.
     pub fn for_report(path: &Path, inputs: &Inputs) -> Result<Self, Failure> {
         let folder = Self::for_study(path, inputs)?;
         match OF_A_STUDY.into_iter().find(|name| path.join(name).exists()) {
@@ -195,7 +189,6 @@ impl TargetFolder {
         }
     }
 
-    /// A folder for a study, which has its own rules for earlier results.
     pub fn for_study(path: &Path, inputs: &Inputs) -> Result<Self, Failure> {
         let folder = Self { path: path.to_owned(), inputs: inputs.clone() };
         let refused = |error: &Error| cannot("write into the folder", path, error);
@@ -220,12 +213,10 @@ impl TargetFolder {
         &self.path
     }
 
-    /// Makes the folder and its parents if they are missing.
     pub fn make(&self) -> Result<(), Failure> {
         fs::create_dir_all(&self.path).map_err(|error| cannot("make the folder", &self.path, &error))
     }
 
-    /// Removes a file if it exists.
     pub fn remove(&self, name: &str) -> Result<(), Failure> {
         let path = self.path.join(name);
         match fs::remove_file(&path) {
@@ -234,13 +225,12 @@ impl TargetFolder {
         }
     }
 
-    /// Writes one file of the report.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Failure> {
         self.make()?;
         self.target(name.as_ref()).write(bytes)
     }
 
-    /// Writes the files of a report; with the feature `png`, also a copy of every figure as PNG.
+    /// Writes the files of a report; with the feature `png`, also a PNG of every figure.
     pub fn write_report(&self, files: Vec<ReportFile>) -> Result<(), Failure> {
         #[cfg(feature = "png")]
         let files = palpate_report::with_png_copies(files).map_err(Complaint::new)?;
@@ -252,19 +242,17 @@ impl TargetFolder {
     }
 }
 
-/// True for names of a report's files.
 fn is_of_a_report(name: &str) -> bool {
     let tables = ["errors.csv", "trials.csv", "limit.csv"];
     let is_figure = name.starts_with("figure-") && [".svg", ".png"].iter().any(|end| name.ends_with(end));
     is_figure || name == REPORT_HTML || OF_A_STUDY.contains(&name) || tables.contains(&name)
 }
 
-/// An error if a folder does not accept files: it is better reported before an hour of work than after it.
+/// Fails if a folder does not accept files, so that the error precedes hours of work.
 fn check_takes_files(folder: &Path) -> std::io::Result<()> {
     whole_file::temporary(folder).map(drop)
 }
 
-/// The complaint that a path cannot be used.
 pub fn cannot(what: &str, path: &Path, error: &Error) -> Failure {
     Complaint::new(format!("cannot {what} {}: {error}", path.display())).into()
 }

@@ -1,19 +1,19 @@
-//! Activation functions of a network's nodes.
+//! Activation functions of neural networks.
 
-/// Activation function of a node: its output for its weighted sum z.
+/// Activation function of a weighted sum z.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum Activation {
-    /// σ(z) = 1 / (1 + exp(−z)), between 0 and 1.
+    /// σ(z) = 1 / (1 + exp(−z)).
     Logistic,
-    /// tanh(z), between −1 and 1.
+    /// tanh(z).
     Tanh,
-    /// z itself.
+    /// z.
     Linear,
 }
 
 impl Activation {
-    /// The node's output for the weighted sum `z`.
+    /// Returns the output for the weighted sum `z`.
     pub fn apply(self, z: f64) -> f64 {
         match self {
             Self::Logistic => 1.0 / (1.0 + libm::exp(-z)),
@@ -22,7 +22,7 @@ impl Activation {
         }
     }
 
-    /// Replaces a layer's weighted sums by its outputs: [`Activation::apply`] to within 4·10⁻¹⁶ of 1, several nodes at a time.
+    /// Applies [`Activation::apply`] in place, to 4·10⁻¹⁶.
     pub fn apply_all(self, values: &mut [f64]) {
         match self {
             Self::Logistic => {
@@ -38,26 +38,25 @@ impl Activation {
     }
 }
 
-/// Constants of the logistic function σ: σ(z) = 1 / (1 + 2^n·2^r), where −z·log₂ e = n + r, n is whole and |r| ≤ ½.
+/// Constants of σ(z) = 1 / (1 + 2^n·2^r), with −z·log₂ e = n + r and |r| ≤ ½.
 ///
-/// 2^r is the quotient (E + r·O) / (E − r·O), with E and O polynomials in r². It costs no extra division, since σ is a quotient anyway:
-/// σ = (E − r·O) / ((E − r·O) + 2^n·(E + r·O)). The rounding error of z·log₂ e grows with |z|, but σ′ falls faster. Therefore r needs no
-/// second part.
+/// 2^r = (E + r·O) / (E − r·O), with polynomials E and O in r². The rounding error of z·log₂ e grows with
+/// |z|, but σ′ falls faster. Therefore r needs no second part.
 #[derive(Clone, Copy, Debug)]
 pub struct Logistic;
 
 impl Logistic {
-    /// z is clamped to ±END, where 2^n·E is a normal number and σ is 0 or 1 to 10⁻³⁰⁰.
+    /// Bound of |z|; σ is then 0 or 1 to 10⁻³⁰⁰, with 2^n·E normal.
     pub const END: f64 = 691.0;
-    /// E's coefficients, lowest first: with O's the minimax quotient, of relative error 1.3·10⁻¹⁷ as they are rounded here.
+    /// Coefficients of E, lowest first: minimax, relative error 1.3·10⁻¹⁷ after rounding.
     pub const EVEN: [f64; 3] = [189_140.054_010_213_3, 10_096.716_587_306_339, 43.300_524_562_927_92];
-    /// O's coefficients, lowest first, before the third, which is 1.
+    /// Coefficients of O, lowest first; the third is 1.
     pub const ODD: [f64; 2] = [65_550.947_584_067_56, 874.742_790_038_898_7];
-    /// Adding and then subtracting it rounds to a whole number. The low bits of this number are the lowest bits of the sum.
+    /// 1.5·2⁵², which rounds to an integer in the low bits.
     const ROUNDER: f64 = 6_755_399_441_055_744.0;
 }
 
-/// σ of B sums in step, without branches or calls, so that the compiler can use vectors.
+/// σ without branches and calls, for vectorization.
 #[inline(always)]
 fn logistic<const B: usize>(values: &mut [f64; B]) {
     let ([e0, e1, e2], [o0, o1]) = (Logistic::EVEN, Logistic::ODD);

@@ -1,6 +1,6 @@
-//! Where and how hard a surface is touched.
+//! Contacts.
 
-/// A point on the surface, measured from its left support or lower left corner.
+/// A point, measured from the left support or lower left corner.
 ///
 /// ```
 /// use palpate_core::Position;
@@ -11,35 +11,35 @@
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Position {
-    /// Distance along the length, in metres.
+    /// Distance along the length in metres.
     pub x_m: f64,
-    /// Distance across the width, in metres; 0 on a one-dimensional surface.
+    /// Distance across the width in metres.
     pub y_m: f64,
 }
 
 impl Position {
-    /// The point at `x_m` metres along a one-dimensional surface.
+    /// Returns a point on a one-dimensional surface.
     pub const fn along(x_m: f64) -> Self {
         Self { x_m, y_m: 0.0 }
     }
 
-    /// The order by x, then by y.
+    /// Compares by x, then by y.
     pub fn cmp_by_x_then_y(&self, other: &Self) -> core::cmp::Ordering {
         self.x_m.total_cmp(&other.x_m).then(self.y_m.total_cmp(&other.y_m))
     }
 
-    /// The straight distance to `other`, in metres.
+    /// Returns the distance to `other` in metres.
     pub fn distance_m(self, other: Self) -> f64 {
         libm::hypot(self.x_m - other.x_m, self.y_m - other.y_m)
     }
 }
 
-/// One touch: a force at a position.
+/// A force at a position.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Contact {
-    /// Position at which the force acts.
+    /// Position of the force.
     pub position: Position,
-    /// The force, in newtons, positive downward, into the surface.
+    /// Force in newtons, positive into the surface.
     pub force_n: f64,
 }

@@ -1,18 +1,17 @@
-//! Estimates of contacts, with uncertainty and status.
+//! Estimates of contacts.
 
 use crate::Position;
 
-/// Estimate of the contacts that made one reading.
+/// Estimate of the contacts of one reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// The contact: the only one, or the strongest.
+    /// The only or strongest contact.
     pub contact: ContactEstimate,
     /// Reliability of the estimate.
     pub status: Status,
-    /// Other places that explain the same single contact, most probable first, when the status is
-    /// [`Status::Ambiguous`].
+    /// Further modes, most probable first, for [`Status::Ambiguous`].
     pub modes: BoundedList<Mode, 3>,
-    /// Contacts beside the first that touch at the same time, strongest first.
+    /// Simultaneous further contacts, strongest first.
     pub further: BoundedList<ContactEstimate, 2>,
 }
 
@@ -21,9 +20,9 @@ pub struct Estimate {
 pub struct ContactEstimate {
     /// Estimated position.
     pub position: Position,
-    /// Force in newtons, positive downward, where it is known or estimated.
+    /// Force in newtons, if known or estimated.
     pub force_n: Option<f64>,
-    /// Uncertainty of position and force, where the method estimates it.
+    /// Uncertainty, if estimated.
     pub uncertainty: Option<Uncertainty>,
 }
 
@@ -43,70 +42,66 @@ impl ContactEstimate {
     }
 }
 
-/// The uncertainty of one estimated contact.
+/// Uncertainty of an estimated contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Uncertainty {
-    /// Covariance of (x, y, force), in m², m·N and N², upper triangle: xx, xy, xf, yy, yf, ff. Entries of quantities that are not estimated
-    /// are 0.
+    /// Covariance of (x, y, force) in m², m·N and N²: xx, xy, xf, yy, yf, ff; 0 if not estimated.
     pub covariance: [f64; 6],
-    /// Lower and upper end of the 95 % interval along x, in metres.
+    /// 95 % interval of x in metres.
     pub x_95_m: (f64, f64),
-    /// Lower and upper end of the 95 % interval across, in metres; both 0 on a one-dimensional surface.
+    /// 95 % interval of y in metres.
     pub y_95_m: (f64, f64),
-    /// Lower and upper end of the 95 % interval of the force, in newtons, where force and place trade off; `None` elsewhere. Beside an end
-    /// or an edge a harder contact nearer to it reads like a softer one farther away. The standard deviation does not describe the
-    /// uncertainty of the force there.
+    /// 95 % interval of the force in newtons, where a standard deviation does not describe it (near an edge).
     pub force_95_n: Option<(f64, f64)>,
 }
 
 impl Uncertainty {
-    /// Uncertainty of a contact on a line, from the covariance of position and force: xx, xf, ff.
+    /// Creates an uncertainty on a line from xx, xf, ff.
     pub const fn on_line([xx, xf, ff]: [f64; 3], x_95_m: (f64, f64)) -> Self {
         Self { covariance: [xx, 0.0, xf, 0.0, 0.0, ff], x_95_m, y_95_m: (0.0, 0.0), force_95_n: None }
     }
 }
 
-/// One place that explains a reading, with its probability.
+/// A mode of the posterior.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mode {
-    /// The contact there.
+    /// Contact at the mode.
     pub contact: ContactEstimate,
-    /// Share of the posterior probability, 0 to 1.
+    /// Posterior probability, 0 to 1.
     pub probability: f64,
 }
 
-/// Largest size of a channel's reading that a contact may explain; its third power and products of that are numbers.
+/// Largest magnitude of a reading; cubes and their products remain finite.
 pub const LARGEST_READING: f64 = 1e60;
 
-/// Status of an estimate: its reliability.
+/// Reliability of an estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     /// A position on the surface.
     Located,
-    /// The surface is untouched: the reading is noise, and the position has no meaning.
+    /// An untouched surface, without a position.
     NoContact,
-    /// Several places explain the reading: the estimate is the most probable one, and its modes are the others. Or hardly any place is
-    /// excluded: the 95 % interval is the whole surface, and the list of modes is empty.
+    /// Several modes, with the most probable as estimate; without modes, the 95 % interval is the whole
+    /// surface.
     Ambiguous,
     /// No contact explains the reading within the noise: more contacts than assumed, a damaged sensor, drift.
     OutsideModel,
-    /// A position beyond the surface's edge, which no contact can have.
+    /// A position beyond the edge.
     OutsideSurface,
 }
 
 impl Estimate {
-    /// An estimate of the position alone.
+    /// Returns an estimate of a position.
     pub const fn of_position(position: Position, status: Status) -> Self {
         Self::of_contact(ContactEstimate { position, force_n: None, uncertainty: None }, status)
     }
 
-    /// An estimate of one contact.
+    /// Returns an estimate of one contact.
     pub const fn of_contact(contact: ContactEstimate, status: Status) -> Self {
         Self { contact, status, modes: BoundedList::none(NO_MODE), further: BoundedList::none(NO_CONTACT) }
     }
 
-    /// True when all positions, forces, intervals and probabilities are finite and no covariance is NaN. An infinite covariance is allowed for an
-    /// undetermined quantity.
+    /// Returns whether all numbers except covariances are finite, and none is NaN.
     pub fn is_in_numbers(&self) -> bool {
         let of_mode = |mode: &Mode| mode.contact.is_in_numbers() && mode.probability.is_finite();
         self.contact.is_in_numbers()
@@ -116,7 +111,7 @@ impl Estimate {
 }
 
 impl Status {
-    /// Every status.
+    /// All statuses.
     pub const ALL: [Self; 5] =
         [Self::Located, Self::NoContact, Self::Ambiguous, Self::OutsideModel, Self::OutsideSurface];
 
@@ -136,7 +131,7 @@ const NO_CONTACT: ContactEstimate =
     ContactEstimate { position: Position::along(0.0), force_n: None, uncertainty: None };
 const NO_MODE: Mode = Mode { contact: NO_CONTACT, probability: 0.0 };
 
-/// A list of at most N, without allocation.
+/// A list of at most N items, without allocation.
 ///
 /// ```
 /// use palpate_core::BoundedList;
@@ -153,12 +148,12 @@ pub struct BoundedList<T, const N: usize> {
 }
 
 impl<T: Copy, const N: usize> BoundedList<T, N> {
-    /// An empty list; `filler` fills the unused slots.
+    /// Creates an empty list with unused slots of `filler`.
     pub const fn none(filler: T) -> Self {
         Self { items: [filler; N], len: 0 }
     }
 
-    /// Adds an item; false if the list is full.
+    /// Adds an item; false if full.
     pub fn push(&mut self, item: T) -> bool {
         let Some(slot) = self.items.get_mut(self.len) else { return false };
         *slot = item;
@@ -171,7 +166,7 @@ impl<T: Copy, const N: usize> BoundedList<T, N> {
         self.len = 0;
     }
 
-    /// The items.
+    /// Items.
     pub fn as_slice(&self) -> &[T] {
         &self.items[..self.len]
     }

@@ -1,5 +1,4 @@
-//! The part of palpate that also runs on a microcontroller: a reading goes in, an estimate comes out.
-//! No allocation, no standard library.
+//! Locators for microcontrollers, without allocation.
 //!
 //! ```
 //! use palpate_core::{Activation, Estimate, Network, Position, Status};

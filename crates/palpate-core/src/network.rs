@@ -1,14 +1,13 @@
-//! Forward pass of a fully connected network. It suits a microcontroller, because it reads the weights row by row in place. Tests compare
-//! faster passes with it.
+//! Forward pass of a fully connected network, without allocation.
 
 use crate::Activation;
 
 /// A trained network that borrows its weights.
 #[derive(Clone, Copy, Debug)]
 pub struct Network<'a> {
-    /// Nodes of every layer, inputs first and outputs last.
+    /// Nodes of every layer, inputs first.
     pub sizes: &'a [usize],
-    /// Whether every node has a bias.
+    /// True if every node has a bias.
     pub biases: bool,
     /// Activation of the hidden layers.
     pub hidden_activation: Activation,
@@ -18,31 +17,30 @@ pub struct Network<'a> {
     pub weights: &'a [f64],
 }
 
-/// A buffer with another length than the network requires.
+/// A buffer of the wrong length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BufferMismatch {
-    /// Length that the network requires.
+    /// Required length.
     pub needed: usize,
-    /// Length of the buffer.
+    /// Actual length.
     pub found: usize,
 }
 
 impl Network<'_> {
-    /// Number of weights that `sizes` requires.
+    /// Number of weights for `sizes`.
     pub fn weight_count(&self) -> usize {
         self.sizes.windows(2).map(|pair| pair[1] * (pair[0] + usize::from(self.biases))).sum()
     }
 
-    /// Numbers of scratch that [`Network::forward_into`] needs: two layers of the widest.
+    /// Length of scratch for [`Network::forward_into`].
     pub fn scratch_len(&self) -> usize {
         2 * self.sizes.iter().copied().max().unwrap_or(0)
     }
 
-    /// a = f(W x + b), layer by layer, from scaled inputs to outputs.
+    /// Computes a = f(W x + b) layer by layer.
     ///
     /// # Errors
-    /// [`BufferMismatch`] when `inputs`, `outputs`, `scratch` or the weights have another length than the network requires
-    /// (`scratch` may be longer).
+    /// [`BufferMismatch`]; `scratch` may be longer than required.
     pub fn forward_into(
         &self,
         inputs: &[f64],
@@ -77,7 +75,6 @@ impl Network<'_> {
     }
 }
 
-/// Σ w·x in four independent sums.
 fn dot(weights: &[f64], inputs: &[f64]) -> f64 {
     let ((weights, last_weights), (inputs, last_inputs)) =
         (weights.as_chunks::<4>(), inputs.as_chunks::<4>());

@@ -1,17 +1,12 @@
-//! Tare: replaces today's untouched reading of a surface with its untouched reading at calibration.
-//!
-//! Offsets of raw channels move between calibration and use, with the temperature or when a plug is pulled and put back. With r the
-//! reading, b its baseline (the untouched reading of the channel today) and o its untouched reading at calibration, the tared
-//! reading is r − b + o.
+//! Tare: r − b + o, with the reading r, its baseline b (the current untouched reading), and the untouched
+//! reading o at calibration.
 
 mod rest;
 
 use crate::{Estimate, LARGEST_READING, Status};
 use rest::{Course, RestLength, RestWatch};
 
-/// Baseline of the channels of a surface, kept in arrays, vectors or slices `B` of the caller.
-///
-/// The baseline is the mean of readings that are known to be untouched ([`Tare::add_untouched`]), or it is followed
+/// Baseline of the channels: mean of known untouched readings ([`Tare::add_untouched`]), or tracked
 /// ([`Tare::follow`]).
 ///
 /// ```
@@ -27,83 +22,63 @@ use rest::{Course, RestLength, RestWatch};
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tare<B> {
-    /// Untouched reading of each channel at calibration.
     learnt: B,
     time_constant: u32,
-    /// Time of the reading before and mean interval between readings, in seconds, of readings that have times.
     clock: Option<Clock>,
     zero: Zero,
-    /// Mean of the untouched readings of the current moment, and the time of the first of them, for [`Zero::Last`].
+    /// Mean and start of a moment, for [`Zero::Last`].
     moment: Option<(Baseline<B>, f64)>,
     current: Baseline<B>,
-    /// True once the baseline is known to be that of the untouched surface.
     is_confirmed: bool,
-    /// Alternative baseline: either of readings that are `outside_model` by the unconfirmed current one, or the one that the current one replaced.
+    /// Alternative to an unconfirmed baseline, or the replaced one.
     other: Option<Baseline<B>>,
-    /// Consecutive readings that are `outside_model` by the alternative baseline too.
+    /// Run of readings that are `outside_model` by both baselines.
     strange: u32,
-    /// Consecutive readings that indicate the end of a touch.
+    /// Run of readings with a contact as negative.
     let_go: u32,
-    /// Consecutive readings that are untouched by the offsets of the calibration, and `outside_model` by the baseline.
+    /// Run of readings that only the calibration's offsets fit.
     as_learnt: u32,
     rest: RestWatch<B>,
-    /// Whether the rest after a touch becomes the baseline.
     takes_rests: bool,
-    /// Drift of the untouched reading in the course of the calibration.
     drift: Option<CalibrationDrift<B>>,
 }
 
-/// Untouched readings that make a followed baseline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Zero {
-    /// Untouched readings over a time constant.
     Followed,
-    /// Latest untouched reading.
     Last,
 }
 
-/// Times of readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Clock {
     last_s: f64,
-    /// Time since the reading before the last one.
     step_s: f64,
     interval_s: f64,
-    /// Intervals of the mean, at most a time constant.
     intervals: u32,
 }
 
-/// Drift of the untouched reading in the course of a calibration.
 #[derive(Clone, Debug, PartialEq)]
 struct CalibrationDrift<B> {
-    /// Last untouched reading of each channel.
     last: B,
-    /// Largest change of each channel since then that counts as more drift.
     reach: B,
 }
 
-/// A baseline with its drift and counts of readings.
 #[derive(Clone, Debug, PartialEq)]
 struct Baseline<B> {
     values: B,
-    /// Drift of each channel per reading.
     drift: B,
-    /// Readings since the last untouched one, over which the drift was extrapolated.
     carried: u32,
-    /// Readings since the baseline was set to a rest.
     since_rest: u32,
-    /// Number of averaged readings, at most the time constant; 0 while the baseline is that of the calibration.
+    /// Averaged readings; 0 for the offsets of the calibration.
     weight: u32,
-    /// Consecutive readings that are a contact by this baseline; kept once they are a touch.
     touched: u32,
-    /// Consecutive readings that are untouched by this baseline.
     untouched: u32,
 }
 
-/// A reading that does not fit a tare.
+/// Error of a reading that does not fit a tare.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TareError {
-    /// Another number of channels.
+    /// A wrong number of channels.
     Channels {
         /// Channels of the tare.
         needed: usize,
@@ -112,7 +87,7 @@ pub enum TareError {
     },
     /// A value that is not finite.
     NotFinite {
-        /// Number of the channel, from 1.
+        /// Channel, from 1.
         channel: usize,
         /// Value.
         value: f64,
@@ -135,46 +110,42 @@ impl core::fmt::Display for TareError {
 impl core::error::Error for TareError {}
 
 impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
-    /// Fewest readings for a settled baseline: their mean has about a fifth of the noise of one reading.
+    /// Fewest readings of a settled baseline; the mean has a fifth of the noise.
     pub const SETTLED: u32 = 20;
-    /// Time over which a followed baseline forgets, in seconds, where readings have times ([`Tare::note_time`]).
+    /// Time constant of a tracked baseline in seconds ([`Tare::note_time`]).
     pub const TIME_CONSTANT_S: f64 = 10.0;
-    /// Time in seconds over which untouched readings are averaged for [`Tare::with_last_zero`]: longer than a touch takes to build up, so that
-    /// the baseline does not follow it.
+    /// Averaging time of [`Tare::with_last_zero`] in seconds, longer than a touch takes to build up.
     pub const MOMENT_S: f64 = 1.0;
-    /// Readings over which a followed baseline forgets where readings have no times: [`Tare::TIME_CONSTANT_S`] at 100 readings a second.
+    /// Time constant in readings without times: [`Tare::TIME_CONSTANT_S`] at 100 Hz.
     pub const TIME_CONSTANT: u32 = 1000;
 
-    /// Consecutive readings that establish the end of a touch: three of a thousand readings of noise alone are outside the model.
+    /// Consecutive readings of a release; 0.3 % of the readings of noise are outside the model.
     pub const LET_GO: u32 = 5;
 
-    /// Tare with the baseline `learnt`, the untouched reading of each channel at calibration.
+    /// Creates a tare with the untouched reading at calibration.
     ///
     /// # Errors
-    /// [`TareError::NotFinite`] for a value that is not finite.
+    /// A value that is not finite.
     pub fn new(learnt: B) -> Result<Self, TareError> {
         check(learnt.as_ref(), learnt.as_ref().len())?;
         Ok(Self::of_learnt(learnt))
     }
 
-    /// Sets the time constant of a followed baseline, in readings; at least [`Tare::SETTLED`].
+    /// Sets the time constant in readings; at least [`Tare::SETTLED`].
     #[must_use]
     pub fn with_time_constant(self, readings: u32) -> Self {
         Self { time_constant: readings.max(Self::SETTLED), ..self }
     }
 
-    /// Uses the latest untouched reading as the followed baseline. Suits calibrations that subtract from each press the untouched reading before
-    /// it. For readings with times the baseline is the mean over the last [`Tare::MOMENT_S`].
+    /// Uses the latest untouched reading (mean over [`Tare::MOMENT_S`]) as baseline, for calibrations with an
+    /// offset per press.
     #[must_use]
     pub fn with_last_zero(self) -> Self {
         Self { zero: Zero::Last, ..self }
     }
 
-    /// Notes the time of the next reading in seconds, by any clock. A followed baseline then forgets over [`Tare::TIME_CONSTANT_S`] at the mean
-    /// rate of the readings, but over no fewer than [`Tare::SETTLED`] readings. A time that is not later than the one before restarts the clock.
-    ///
-    /// The length of the rest after a touch is then in seconds too. [`Tare::SETTLED`] and [`Tare::LET_GO`] remain counts of readings, because they
-    /// depend on the noise of single readings.
+    /// Sets the time of the next reading in seconds, by any clock; time constant and rests are then in
+    /// seconds, too. A time that does not increase restarts the clock.
     pub fn note_time(&mut self, time_s: f64) {
         let new = Clock { last_s: time_s, step_s: f64::INFINITY, interval_s: 0.0, intervals: 0 };
         let Some(mut clock) = self.clock.filter(|clock| time_s > clock.last_s) else {
@@ -190,18 +161,17 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         self.time_constant = ((Self::TIME_CONSTANT_S / clock.interval_s) as u32).max(Self::SETTLED);
     }
 
-    /// Leaves the residue of a touch in the tared readings, for a caller that removes creep by itself.
+    /// Keeps the residue of a touch, for callers that correct creep.
     #[must_use]
     pub fn without_rests(self) -> Self {
         Self { takes_rests: false, ..self }
     }
 
-    /// Sets the drift of the untouched reading in the course of the calibration. `last` is the last untouched reading of the calibration, and `reach`
-    /// the largest change of each channel that counts as more drift. The first readings after the calibration are untouched where they are within
-    /// `reach`.
+    /// Sets the drift of the calibration: first readings within `reach` of the `last` untouched one are
+    /// untouched.
     ///
     /// # Errors
-    /// [`TareError`] for another number of channels, or a value of `last` that is not finite.
+    /// A wrong number of channels, or a value of `last` that is not finite.
     pub fn with_drift(mut self, last: B, reach: B) -> Result<Self, TareError> {
         let needed = self.learnt.as_ref().len();
         check(last.as_ref(), needed)?;
@@ -231,7 +201,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         }
     }
 
-    /// Tare of this calibration and these settings in its initial state.
+    /// A tare with these settings, without a baseline.
     #[must_use]
     pub fn restarted(&self) -> Self {
         let Self { time_constant, clock, zero, takes_rests, .. } = *self;
@@ -239,26 +209,25 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         Self { time_constant, clock, zero, takes_rests, drift, ..Self::of_learnt(self.learnt.clone()) }
     }
 
-    /// Untouched reading of each channel today, as far as is known.
+    /// Estimated current untouched reading.
     pub fn baseline(&self) -> &[f64] {
         self.current.values.as_ref()
     }
 
-    /// Untouched reading of each channel at calibration.
+    /// Untouched reading at calibration.
     pub fn learnt(&self) -> &[f64] {
         self.learnt.as_ref()
     }
 
-    /// False while a followed baseline may be that of a touch: the offsets of the calibration do not fit, and no contact has yet begun and ended by
-    /// the baseline.
+    /// False while the baseline may be that of a touch.
     pub fn is_confirmed(&self) -> bool {
         self.is_confirmed
     }
 
-    /// Adds a reading that is known to be untouched to the mean that is the baseline; the first one replaces the offsets of the calibration.
+    /// Adds a known untouched reading to the mean.
     ///
     /// # Errors
-    /// [`TareError`] for another number of channels or a value that is not finite.
+    /// A wrong number of channels, or a value that is not finite.
     pub fn add_untouched(&mut self, reading: &[f64]) -> Result<(), TareError> {
         check(reading, self.learnt.as_ref().len())?;
         self.is_confirmed = true;
@@ -267,10 +236,10 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         Ok(())
     }
 
-    /// Writes the tared reading, r − b + o, into `tared`.
+    /// Writes the tared reading, r − b + o.
     ///
     /// # Errors
-    /// [`TareError`] where reading or `tared` have another number of channels, or for a value that is not finite, also in the tared reading.
+    /// A wrong number of channels, or a value that is not finite.
     pub fn apply(&self, reading: &[f64], tared: &mut [f64]) -> Result<(), TareError> {
         let needed = self.learnt.as_ref().len();
         check(reading, needed)?;
@@ -282,32 +251,28 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         check(tared, needed)
     }
 
-    /// Locates a tared reading, and follows the drift of the baseline while the surface is untouched. `tared` contains the tared reading afterwards.
+    /// Writes the tared reading into `tared`, locates it, and updates the baseline by its status:
+    /// - `no_contact`: level and slope of a line through such readings of the last [`Tare::TIME_CONSTANT_S`];
+    /// - contact: extrapolation over as many readings as the slope was fitted to. A first reading within the
+    ///   drift of the calibration is the baseline ([`Tare::with_drift`]);
+    /// - steady readings after a touch, `no_contact` or small compared with it (hysteresis, creep, drift):
+    ///   their mean;
+    /// - `outside_model` by a baseline of fewer than [`Tare::SETTLED`] readings: the reading, unless beyond
+    ///   ±[`LARGEST_READING`];
+    /// - `outside_model` by a settled baseline: unchanged, because a palm is not a contact of the model
+    ///   either. Exceptions after [`Tare::LET_GO`] readings:
+    ///   - their negative is a contact, so the surface was touched during the tare: the reading;
+    ///   - the offsets of the calibration fit: these;
+    ///   - a contact has begun and ended by an alternative baseline, and the current one is unconfirmed: the
+    ///     alternative.
     ///
-    /// The status from `locate` determines the effect of the reading on the baseline:
-    /// - `no_contact`: the baseline follows a straight line through such readings of the last [`Tare::TIME_CONSTANT_S`]. The slope of the line is
-    ///   the drift. [`Tare::with_last_zero`] takes the reading itself;
-    /// - a contact of any duration: the reading does not move the baseline. The baseline drifts on for as many readings as the drift was
-    ///   estimated from. The first reading is the new baseline where more of the calibration's drift explains it ([`Tare::with_drift`]);
-    /// - after a touch, steady readings that are `no_contact`, or small compared with the touch: they are the residue of hysteresis, creep or drift, and
-    ///   their mean is the new baseline;
-    /// - `outside_model`, not explained by a contact: while the baseline is not yet the mean of [`Tare::SETTLED`] readings, the surface has
-    ///   moved since its calibration. The reading is then the new baseline, unless a value of it is beyond ±[`LARGEST_READING`]. Later the
-    ///   baseline stays, because a palm is not a contact of the model either. There are three exceptions, each after [`Tare::LET_GO`] consecutive
-    ///   readings:
-    ///   - the opposite of the readings is a contact: the surface was touched when it was tared and has been released, and the reading
-    ///     is the new baseline;
-    ///   - the surface is untouched by the offsets of the calibration: they are the baseline again;
-    ///   - the baseline is not confirmed, and a contact has begun and ended by an alternative baseline, the mean of such readings: the alternative
-    ///     becomes the baseline. The replaced baseline is kept, and returns when a contact has begun and ended by it.
-    ///
-    /// A baseline is confirmed if the offsets of the calibration fit, or if it is the mean of readings known to be untouched. It is also confirmed once
-    /// a contact has begun and ended by it. If a board is touched while it starts, its baseline is correct from the moment of release. There is one
-    /// exception: the offsets have also moved, and the touch is not a contact of the model (a palm, another force than the known one). The baseline is
-    /// then correct from the end of the first valid contact. Contacts below the detection threshold go into the baseline.
+    /// Known untouched readings, fitting offsets of the calibration, or a contact that begins and ends
+    /// confirm a baseline. After a touch during the start the baseline is correct from the release on, or
+    /// from the end of the first valid contact on. Contacts below the detection threshold go into the
+    /// baseline.
     ///
     /// # Errors
-    /// [`TareError`] as for [`Tare::apply`].
+    /// As for [`Tare::apply`].
     pub fn follow(
         &mut self,
         reading: &[f64],
@@ -355,7 +320,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             other.untouched = 0;
         }
         if status == Status::NoContact && self.current.weight == 0 {
-            // The offsets have not moved: those of the calibration count as a settled baseline.
+            // Fitting offsets of the calibration count as a settled baseline.
             self.current.weight = Self::SETTLED;
             self.is_confirmed = true;
         }
@@ -383,8 +348,8 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         self.rest.add(reading, self.current.values.as_ref(), status, self.time_constant, length)
     }
 
-    /// Sets the baseline to the mean of the untouched readings of a moment of [`Tare::MOMENT_S`] once it is over. A reading without a time, or one
-    /// that follows after at least this time, is a moment by itself. A touch discards the moment, to keep its slow beginning out of the baseline.
+    /// A reading without a time, or after a gap, is a moment by itself. A touch discards the moment with its
+    /// slow beginning.
     fn take_last(&mut self, reading: &[f64]) {
         if self.current.weight < Self::SETTLED {
             self.current.average(reading, Self::SETTLED);
@@ -403,7 +368,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         }
     }
 
-    /// Tests other baselines with a reading that is `outside_model` by the settled one; `tared` is the reading tared by the settled one.
+    /// Tests other baselines than the settled one.
     fn doubt(&mut self, reading: &[f64], tared: &[f64], locate: &mut impl FnMut(&[f64]) -> Estimate) {
         let mut scratch = self.learnt.clone();
         let mut status_of = |values: &[f64]| {
@@ -422,7 +387,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             self.as_learnt = 0;
             return;
         }
-        // The beginning of a touch can look like a release too, but its readings are not steady.
+        // The beginning of a touch resembles a release, but its readings are not steady.
         if self.let_go >= LET_GO && self.rest.stays() {
             self.begin_at(reading);
             return;
@@ -434,7 +399,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         self.weigh_other(reading, status);
     }
 
-    /// Chooses between the current and the alternative baseline with a reading. It is `outside_model` by the current one, and has `status` by the other.
+    /// Updates, exchanges or replaces the alternative baseline.
     fn weigh_other(&mut self, reading: &[f64], status: Status) {
         if let Some(other) = &mut self.other {
             self.strange = next_in_row(self.strange, status == Status::OutsideModel);
@@ -458,7 +423,6 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         }
     }
 
-    /// Sets the baseline to a reading, unconfirmed.
     fn begin_at(&mut self, reading: &[f64]) {
         if !self.is_possible(reading) {
             return;
@@ -475,7 +439,6 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         baseline
     }
 
-    /// True for a reading that more of the calibration's drift explains.
     fn has_drifted_to(&self, reading: &[f64]) -> bool {
         self.drift.as_ref().is_some_and(|CalibrationDrift { last, reach }| {
             let mut channels = reading.iter().zip(last.as_ref()).zip(reach.as_ref());
@@ -488,12 +451,12 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     }
 }
 
-/// [`Tare::LET_GO`], which is independent of the container.
 const LET_GO: u32 = Tare::<[f64; 0]>::LET_GO;
 
-/// Fewest readings for an estimate of the drift: a level with a drift then has 4/50 of the variance of a reading.
+/// Fewest readings of a drift: the level then has 4/50 of the variance of a reading.
 const DRIFT_FROM: u32 = 50;
-/// Fewest readings for an extrapolation of the drift during a contact: over as many readings again its error is a quarter of the noise, √(12/200).
+/// Fewest readings of an extrapolated drift: over as many readings its error is √(12/200), a quarter of the
+/// noise.
 const DRIFT_KNOWN: u32 = 200;
 
 impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
@@ -503,8 +466,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
         Self { values, drift, carried: 0, since_rest: u32::MAX, weight, touched: 0, untouched: 0 }
     }
 
-    /// Moves the baseline by its drift for the time of a reading. Without untouched readings it does so for at most as many readings as the drift was
-    /// estimated from.
+    /// Extrapolates the drift, at most over as many readings as it was fitted to.
     fn carry_drift_on(&mut self) {
         let is_known = self.weight >= DRIFT_KNOWN && self.carried < self.weight;
         if is_known || (self.weight > 0 && self.carried == 0) {
@@ -514,13 +476,11 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
         }
     }
 
-    /// Sets the baseline to the mean of `readings` readings at rest, and keeps its drift.
     fn put_to(&mut self, rest: &[f64], readings: u32) {
         self.values.as_mut().copy_from_slice(rest);
         (self.since_rest, self.carried) = (readings, 0);
     }
 
-    /// Writes the tared reading, r − b + o, into `tared`.
     fn take_off(&self, reading: &[f64], learnt: &[f64], tared: &mut [f64]) {
         let baselines = self.values.as_ref().iter().zip(learnt);
         for ((tared, value), (baseline, learnt)) in tared.iter_mut().zip(reading).zip(baselines) {
@@ -528,7 +488,6 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
         }
     }
 
-    /// Counts a reading with its status by this baseline.
     fn count(&mut self, status: Status) {
         self.untouched = next_in_row(self.untouched, status == Status::NoContact);
         if self.touched < LET_GO {
@@ -536,7 +495,6 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
         }
     }
 
-    /// True once [`LET_GO`] consecutive readings were a contact, and as many afterwards untouched.
     fn saw_a_whole_touch(&self) -> bool {
         self.touched >= LET_GO && self.untouched >= LET_GO
     }
@@ -545,7 +503,6 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
         (self.touched, self.untouched) = (0, 0);
     }
 
-    /// Adds a reading to the mean that is the baseline.
     fn average(&mut self, reading: &[f64], most: u32) {
         self.weight = self.weight.saturating_add(1).min(most);
         let share = 1.0 / f64::from(self.weight);
@@ -554,9 +511,9 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
         }
     }
 
-    /// Updates the baseline and its drift by a reading: a straight line through the last readings by least squares, with a memory that grows to the
-    /// time constant (Morrison, *Introduction to Sequential Smoothing and Prediction*, 1969: the expanding-memory filter of degree 1). For the first
-    /// readings, and after a rest, the baseline is their mean.
+    /// Updates level and drift by least squares with a memory that grows to the time constant (Morrison,
+    /// *Introduction to Sequential Smoothing and Prediction*, 1969: expanding-memory filter of degree 1). For
+    /// the first readings, and after a rest, the level is their mean.
     fn follow(&mut self, reading: &[f64], time_constant: u32) {
         self.carried = 0;
         self.since_rest = self.since_rest.saturating_add(1);
@@ -578,7 +535,6 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
     }
 }
 
-/// Number of consecutive readings after the next one: `before` + 1 if it belongs to them, otherwise 0.
 fn next_in_row(before: u32, is_one: bool) -> u32 {
     if is_one { before.saturating_add(1) } else { 0 }
 }
@@ -604,12 +560,12 @@ mod tests {
 
     const LEARNT: [f64; 4] = [50.0, -20.0, 0.0, 7.0];
 
-    /// Readings of four channels for one newton at `x`, from 0 to 1.
+    /// Reading for one newton at `x`, 0 to 1.
     fn influence(x: f64) -> [f64; 4] {
         [40.0 * (1.0 - x), 40.0 * x, 60.0 * x * (1.0 - x), 25.0 * (1.0 - x * x)]
     }
 
-    /// Least squares over a grid of places, for noise of 1 count.
+    /// Least squares for noise of 1 count.
     fn locate(reading: &[f64]) -> Estimate {
         let d: [f64; 4] = core::array::from_fn(|c| reading[c] - LEARNT[c]);
         let square: f64 = d.iter().map(|d| d * d).sum();
@@ -628,7 +584,6 @@ mod tests {
         Estimate::of_position(Position::along(x), status)
     }
 
-    /// Noise of about 1 count that repeats after 101 readings.
     fn reading(number: u32, moved: [f64; 4], force: f64, x: f64) -> [f64; 4] {
         let f = influence(x);
         core::array::from_fn(|c| {
@@ -647,7 +602,6 @@ mod tests {
         estimate
     }
 
-    /// Follows readings of a force at a place.
     fn follow_many(tare: &mut Tare<[f64; 4]>, numbers: core::ops::Range<u32>, (force, x): (f64, f64)) {
         for number in numbers {
             follow(tare, reading(number, MOVED, force, x));
@@ -710,7 +664,8 @@ mod tests {
 
     #[test]
     fn a_slow_touch_does_not_go_into_the_baseline_of_a_fast_board() {
-        // The force grows from 0 to 1.5 within 0.8 s at 1,000 readings a second, after rests of several lengths.
+        // The force grows from 0 to 1.5 within 0.8 s at 1,000 readings a second, after rests of several
+        // lengths.
         for is_last in [false, true] {
             for rest in [1500_u32, 1700, 1950, 2300] {
                 let tare = Tare::new(LEARNT).unwrap();
@@ -720,7 +675,7 @@ mod tests {
                     let force = 1.5 * f64::from(i.saturating_sub(rest).min(800)) / 800.0;
                     follow(&mut tare, reading(i, MOVED, force, 0.3));
                 }
-                // The baseline is off by less than a touch that the locator detects.
+                // The error of the baseline is below the detection threshold.
                 let errors = (0..4).map(|c| tare.baseline()[c] - LEARNT[c] - MOVED[c]);
                 let square: f64 = errors.map(|error| error * error).sum();
                 assert!(square < 20.0, "{is_last}, {rest}: {square}");
@@ -744,7 +699,8 @@ mod tests {
 
     #[test]
     fn the_drift_of_a_calibration_goes_on_until_the_first_reading() {
-        // The channels have drifted like a contact of 1.5 at 0.3, and by a fifth of it again since the calibration.
+        // The channels have drifted like a contact of 1.5 at 0.3; a sixth of the drift follows the
+        // calibration.
         let drifted = influence(0.3).map(|influence| 1.5 * influence);
         let last: [f64; 4] = core::array::from_fn(|c| LEARNT[c] + drifted[c] / 1.2);
         let moved = |i: u32, force: f64| reading(i, drifted, force, 0.7);
@@ -757,7 +713,8 @@ mod tests {
             assert_eq!(estimate.status == Status::NoContact, force == 0.0, "{i}");
         }
         assert!(is_right(&aware, drifted), "{:?}", aware.baseline());
-        // A contact at another place does not count as drift. After a contact within the reach the baseline is right from its end on.
+        // A contact at another position does not count as drift. After a contact within the reach the
+        // baseline is correct.
         let mut touched = aware.restarted();
         assert_eq!(follow(&mut touched, reading(0, [0.0; 4], 4.0, 0.7)).status, Status::Located);
         let mut touched = aware.restarted();
@@ -779,7 +736,7 @@ mod tests {
         assert!(is_right(&tare, moved(100_000)), "{:?}", tare.baseline());
     }
 
-    /// The locator of [`locate`] for a known force of 1.5.
+    /// Locator for a known force of 15.
     fn locate_known(reading: &[f64]) -> Estimate {
         let d: [f64; 4] = core::array::from_fn(|c| reading[c] - LEARNT[c]);
         let square: f64 = d.iter().map(|d| d * d).sum();
@@ -797,8 +754,7 @@ mod tests {
         Estimate::of_position(Position::along(x), status)
     }
 
-    /// Presses of a force by hand on a board that drifts and leaves a residue. The untouched readings are known within a second of the end of each, at
-    /// 100 readings a second. The drift is in counts per reading.
+    /// Presses of 15 with a drift per reading and a residue, at 100 Hz.
     fn presses_end(locate: fn(&[f64]) -> Estimate, drift: f64, residue: f64) {
         let mut tare = Tare::new(LEARNT).unwrap();
         let mut number = 0;
@@ -847,7 +803,6 @@ mod tests {
         assert!(is_right(&tare, MOVED), "{:?}", tare.baseline());
     }
 
-    /// Follows readings of a palm, a newton or more at either end.
     fn follow_palm(tare: &mut Tare<[f64; 4]>, numbers: core::ops::Range<u32>, moved: [f64; 4]) -> Estimate {
         let mut estimate = None;
         for number in numbers {
@@ -873,7 +828,7 @@ mod tests {
     fn a_palm_while_a_moved_board_starts_is_forgotten_once_a_contact_has_come_and_gone() {
         let mut tare = Tare::new(LEARNT).unwrap();
         follow_palm(&mut tare, 0..300, MOVED);
-        // This cannot be distinguished from a palm on an untouched board.
+        // These readings resemble a palm on an untouched board.
         follow_many(&mut tare, 0..100, (0.0, 0.0));
         assert_eq!(follow(&mut tare, reading(1, MOVED, 0.0, 0.0)).status, Status::OutsideModel);
         follow_many(&mut tare, 0..20, (1.5, 0.6));
@@ -886,7 +841,7 @@ mod tests {
     fn what_lies_on_a_moved_board_from_its_start_on_may_be_touched_and_taken_off() {
         let mut tare = Tare::new(LEARNT).unwrap();
         follow_many(&mut tare, 0..60, (0.0, 0.0));
-        // The finger presses on the thing before it has ever pressed on the board: that confirms the wrong baseline.
+        // A finger presses on the object first: that confirms the wrong baseline.
         follow_palm(&mut tare, 0..60, MOVED);
         let mut on_top = MOVED;
         for (c, moved) in on_top.iter_mut().enumerate() {
@@ -937,7 +892,7 @@ mod tests {
     fn one_loud_reading_is_not_taken_for_a_surface_that_was_let_go() {
         let mut tare = Tare::new(LEARNT).unwrap();
         follow_many(&mut tare, 0..2000, (0.0, 0.0));
-        // The opposite of a contact.
+        // The negative of a contact.
         for _ in 0..Tare::<[f64; 4]>::LET_GO - 1 {
             assert_eq!(follow(&mut tare, reading(7, MOVED, -0.4, 0.4)).status, Status::OutsideModel);
         }

@@ -4,25 +4,25 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::OutOfRange;
 
-/// Default number of contact positions along a line, and along the longer side of a plane.
+/// Default number of contacts: along a line, along a plane's longer side.
 const ALONG_A_LINE: f64 = 400.0;
 const ALONG_A_PLANE: f64 = 30.0;
 
-/// Prior of contact positions: a regular grid between two positions, both included.
+/// Prior of contact positions: a regular grid, both ends included.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactPrior {
     /// The left end, or lower left corner.
     pub from: Position,
     /// The right end, or upper right corner.
     pub to: Position,
-    /// Distance between neighbours, in metres; greater than 0.
+    /// Grid spacing, m; greater than 0.
     pub every_m: f64,
-    /// Relative frequencies of contacts in equal stretches along the length, from left to right; empty where they are uniform.
+    /// Relative frequencies in equal sections of the length, left to right; empty if uniform.
     pub weights: Vec<f64>,
 }
 
 impl ContactPrior {
-    /// Contacts all over a surface, but not on its edge: on a line 1/400 of its length apart.
+    /// Creates contacts on the whole surface without its edge.
     pub fn all_over(extent: Extent) -> Self {
         let every_m = spacing(extent, ALONG_A_LINE, ALONG_A_PLANE);
         let last = |size_m: f64| (size_m - every_m).max(0.5 * size_m);
@@ -35,19 +35,17 @@ impl ContactPrior {
         }
     }
 
-    /// Contacts along a line with uniform weights: every `every_m` from `from_m` to `to_m`, in metres.
+    /// Creates uniform contacts on a line; all arguments in metres.
     pub fn along(from_m: f64, to_m: f64, every_m: f64) -> Self {
         let (from, to) = (Position::along(from_m), Position::along(to_m));
         Self { from, to, every_m, weights: Vec::new() }
     }
 }
 
-/// Checks that a count is at most 1,000,000, so that the items fit into memory.
 pub(crate) fn check_count(what: &'static str, count: f64) -> Result<(), OutOfRange> {
     OutOfRange::check("at most 1,000,000", [(what, count)], |count| count <= 1e6)
 }
 
-/// Checks that positions lie on a surface.
 pub(crate) fn check_positions(
     what: &'static str,
     positions: impl IntoIterator<Item = Position>,
@@ -61,7 +59,6 @@ pub(crate) fn check_positions(
     outside.map_or(Ok(()), |at| Err(beyond(at)))
 }
 
-/// Length of a line, or of the longer side of a plane, divided by `along_a_line` or `along_a_plane`.
 pub(crate) fn spacing(extent: Extent, along_a_line: f64, along_a_plane: f64) -> f64 {
     match extent.width_m() {
         None => extent.length_m() / along_a_line,
@@ -84,17 +81,17 @@ pub(crate) fn spacing(extent: Extent, along_a_line: f64, along_a_plane: f64) -> 
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct WeightedContacts {
-    /// Positions; on a line from left to right, on a plane row by row from the lower left.
+    /// Positions, left to right; on a plane row by row from the lower left.
     pub positions: Vec<Position>,
-    /// Share of the contacts at each position; the sum is 1.
+    /// Shares with the sum 1.
     pub weights: Vec<f64>,
 }
 
 impl WeightedContacts {
-    /// The positions of a prior with the share of each; positions with a share of 0 are omitted.
+    /// Lists the positions with a share above 0.
     ///
     /// # Errors
-    /// [`OutOfRange`] for a prior that does not lie on the surface or has no contacts.
+    /// [`OutOfRange`] for a prior off the surface or without contacts.
     pub fn from_prior(prior: &ContactPrior, extent: Extent) -> Result<Self, OutOfRange> {
         let ContactPrior { from, to, every_m, weights } = prior;
         OutOfRange::check_positive([("the distance of contacts in m", *every_m)])?;
@@ -127,7 +124,7 @@ impl WeightedContacts {
         Ok(Self { positions, weights: weights.iter().map(|weight| weight / sum).collect() })
     }
 
-    /// An even sample of at most `most` contacts, with weights normalized among them.
+    /// Returns an even sample with normalized weights.
     #[must_use]
     pub(crate) fn sample(&self, most: usize) -> Self {
         let step = self.len().div_ceil(most);
@@ -138,17 +135,17 @@ impl WeightedContacts {
         }
     }
 
-    /// Number of contacts, at least one.
+    /// Number of contacts.
     pub fn len(&self) -> usize {
         self.positions.len()
     }
 
-    /// True for zero contacts.
+    /// Returns true for zero contacts.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
     }
 
-    /// The weighted mean of one figure per position.
+    /// Returns the weighted mean of one value per position.
     pub fn mean(&self, figures: impl IntoIterator<Item = f64>) -> f64 {
         self.weights.iter().zip(figures).map(|(weight, figure)| weight * figure).sum()
     }

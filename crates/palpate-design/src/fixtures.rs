@@ -1,4 +1,4 @@
-//! Setups that tests share, as in the examples.
+//! Setups of the tests.
 
 use palpate_estimators::arrangement::Training;
 use palpate_estimators::estimator::Estimator;
@@ -10,31 +10,26 @@ use palpate_mechanics::units::{gpa, mm, newtons, um};
 use crate::positions::PositionDesign;
 use crate::sensors::{ContactPrior, SensorDesign, Sites};
 
-/// A setup and what is designed for it.
 pub(crate) struct Example {
     pub setup: Setup,
     pub design: PositionDesign,
 }
 
-/// The founding paper's beam with eight deflection sensors and a known force.
 pub(crate) fn beam(noise_m: f64) -> Setup {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0)).unwrap();
     let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(noise_m)).unwrap();
     setup.known_force(newtons(3.0)).unwrap()
 }
 
-/// The beam with noise, pressed at twenty places, for the influence estimator.
 pub(crate) fn noisy() -> Example {
     Example { setup: beam(um(5.0)), design: PositionDesign::for_training(&Training::even(20).repeated(5)) }
 }
 
-/// The beam without noise, pressed at ten places, for the paper's network.
 pub(crate) fn paper() -> Example {
     let design = PositionDesign::for_training(&Training::even(10)).estimator(Estimator::default());
     Example { setup: beam(0.0), design }
 }
 
-/// A simply supported plate over 3 × 3 deflection sensors.
 pub(crate) fn plate(elements: usize) -> Example {
     let plate = Plate::simply_supported((mm(300.0), mm(300.0)), mm(0.8), gpa(200.0), 0.3);
     let plate = plate.and_then(|plate| plate.with_elements(elements));
@@ -43,7 +38,6 @@ pub(crate) fn plate(elements: usize) -> Example {
     Example { setup, design: PositionDesign::for_training(&Training::grid(6, 6).repeated(5)) }
 }
 
-/// The beam with the task of placing eight deflection sensors every 5 mm for contacts of unknown force within 20–380 mm.
 pub(crate) fn sensor_design() -> (Setup, SensorDesign) {
     let setup = beam(um(5.0));
     let contacts = ContactPrior::along(mm(20.0), mm(380.0), mm(5.0));

@@ -1,8 +1,6 @@
-//! Placement of sensors and of training presses, scored by the location error that follows.
+//! Placement of sensors and of training presses.
 //!
-//! [`sensors`] places sensors so that the Cramér–Rao bound over the expected contacts is small. [`positions`] places the training
-//! presses so that the error of the estimator is least after simulated calibrations, and advises where to continue a recording.
-//! Both proposals are verified in the same way: calibrations with fresh noise locate contacts ([`Verification`]).
+//! [`sensors`] minimizes the Cramér–Rao bound, [`positions`] the error after simulated calibrations.
 //!
 //! ```
 //! use palpate_design::positions::{PositionDesign, next_press};

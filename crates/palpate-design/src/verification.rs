@@ -6,24 +6,23 @@ use serde::Serialize;
 
 use crate::contacts::WeightedContacts;
 
-/// Mean error of calibrated locators, over the contacts of a design.
+/// Location error after simulated calibrations.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Verification {
-    /// The mean error, in metres, over all calibrations.
+    /// Mean error, m.
     pub mean_error_m: f64,
-    /// Standard error, in metres, from how the calibrations differ.
+    /// Standard error between calibrations, m.
     pub standard_error_m: f64,
-    /// The median of the calibrations' mean errors, in metres.
+    /// Median error of the calibrations, m.
     pub median_error_m: f64,
-    /// Share of the contacts located within the tolerance, in %.
+    /// Share of the contacts within the tolerance, %.
     pub within_tolerance_percent: f64,
     /// Number of calibrations.
     pub calibrations: usize,
 }
 
 impl Verification {
-    /// Summarizes at least one calibration. Each is evaluated with equally many readings of each contact, one contact after the
-    /// other.
+    /// Summarizes calibrations with equally many readings per contact, contact by contact.
     pub(crate) fn from_calibrations(
         calibrations: &[Evaluation],
         contacts: &WeightedContacts,
@@ -42,7 +41,6 @@ impl Verification {
     }
 }
 
-/// Mean error of one calibration at each contact, in metres.
 pub(crate) fn errors_by_contact(calibration: &Evaluation, contacts: &WeightedContacts) -> Vec<f64> {
     let readings = calibration.located.len() / contacts.len();
     let error_m =
@@ -50,7 +48,6 @@ pub(crate) fn errors_by_contact(calibration: &Evaluation, contacts: &WeightedCon
     calibration.located.chunks_exact(readings).map(error_m).collect()
 }
 
-/// Share of the contacts that one calibration locates within the tolerance, by their weights.
 fn share_within(calibration: &Evaluation, contacts: &WeightedContacts, tolerance_m: f64) -> f64 {
     let readings = calibration.located.len() / contacts.len();
     let of_contacts = calibration.located.chunks_exact(readings).zip(&contacts.weights);

@@ -1,4 +1,4 @@
-//! Batches: many readings located at once, in memory that does not grow with their number, by any number of threads.
+//! Batches of readings.
 
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -10,32 +10,31 @@ use palpate_numerics::watch::{Cancelled, Watch};
 use crate::fit::{CheckEstimate, Fitted, Locate, ReadingError};
 use crate::status::NO_CONTACT;
 
-/// Readings of a block: their estimates, 0.9 kB each, stay in a core's second cache.
+/// Readings of a block, with estimates of 0.9 kB each in a core's second-level cache.
 pub const BLOCK: usize = 256;
 
 /// Options of a batch.
 #[derive(Clone, Copy, Debug)]
 pub struct BatchOptions<'a> {
-    /// Threads that locate; the estimates do not depend on it.
+    /// Threads, without effect on estimates.
     pub threads: NonZeroUsize,
-    /// Watch over the batch, which is notified of each block.
+    /// Watch, which is notified of each block.
     pub watch: Watch<'a>,
 }
 
 impl Default for BatchOptions<'_> {
-    /// One thread, without a watch.
     fn default() -> Self {
         Self { threads: NonZeroUsize::MIN, watch: Watch::NONE }
     }
 }
 
-/// Callback for the estimates of a block, from any of the threads, and in any order: `take(first, estimates)`, with the row of the first one, from 0.
+/// Callback `take(first, estimates)` for a block, from any thread, in any order, with the first row from 0.
 pub type TakeBlock<'a> = dyn Fn(usize, &[Estimate]) + Sync + 'a;
 
-/// Invalid readings, or a batch that was stopped.
+/// Error of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum BatchError {
-    /// Values that do not make whole readings.
+    /// Incomplete reading.
     #[error("expected a multiple of {channels} values, found {values}")]
     Uneven {
         /// Number of values.
@@ -43,23 +42,21 @@ pub enum BatchError {
         /// Channels of the locator.
         channels: usize,
     },
-    /// A reading with a value that is not a number.
+    /// Invalid reading.
     #[error("reading {row}: {error}")]
     Reading {
         /// Number of the first invalid reading, from 1.
         row: usize,
-        /// Error of this reading.
+        /// Error of the reading.
         error: ReadingError,
     },
-    /// The batch was stopped.
+    /// Cancelled.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
 
 impl<M: Locate> Fitted<M> {
-    /// Estimates the contacts of many readings, which lie one after the other, one value a channel, in SI units or raw.
-    ///
-    /// The estimates equal those of [`Fitted::locate`] to the last bit. The influence estimator on a line locates eight readings together.
+    /// Estimates the contacts of consecutive readings, equal to [`Fitted::locate`] to the last bit.
     ///
     /// ```
     /// use palpate_estimators::{arrangement::Training, fit::Fit, influence::Influence, setup::Setup};
@@ -76,7 +73,7 @@ impl<M: Locate> Fitted<M> {
     /// ```
     ///
     /// # Errors
-    /// [`BatchError`] for values that make no whole readings, or that are not finite.
+    /// [`BatchError`] for an incomplete or infinite reading.
     pub fn locate_batch(&self, readings: &[f64]) -> Result<Vec<Estimate>, BatchError> {
         let channels = self.channels_of(readings)?;
         let mut estimates = vec![NO_CONTACT; readings.len() / channels];
@@ -87,11 +84,10 @@ impl<M: Locate> Fitted<M> {
         Ok(estimates)
     }
 
-    /// Estimates the contacts of many readings, as [`Fitted::locate_batch`] does, [`BLOCK`] by [`BLOCK`], and hands each block to `take`.
+    /// Estimates contacts by blocks of [`BLOCK`] for `take`.
     ///
     /// # Errors
-    /// [`BatchError`] for values that make no whole readings, or that are not finite, and when the watch stopped it. `take` has then
-    /// received the blocks that were located.
+    /// [`BatchError`], after the completed blocks.
     pub fn locate_blocks(
         &self,
         readings: &[f64],
@@ -109,8 +105,8 @@ impl<M: Locate> Fitted<M> {
         let lock = || failed.lock().unwrap_or_else(PoisonError::into_inner);
         let work = || {
             let mut estimates = vec![NO_CONTACT; BLOCK.min(rows)];
-            // A block that a thread takes is always completed, and so are all blocks before one that fails. The first invalid reading is
-            // thus reported for any number of threads.
+            // A thread always completes its block, and so are all blocks ahead of one that fails. The first
+            // invalid reading is thus reported for any number of threads.
             while lock().is_none() {
                 let first = taken.fetch_add(BLOCK, Ordering::Relaxed);
                 if first >= rows {
@@ -140,7 +136,6 @@ impl<M: Locate> Fitted<M> {
         failed.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
     }
 
-    /// Channels of a reading, at least 1; the number of values must be a multiple of them.
     fn channels_of(&self, readings: &[f64]) -> Result<usize, BatchError> {
         let (values, channels) = (readings.len(), self.layout().len().max(1));
         if values.is_multiple_of(channels) {
@@ -150,7 +145,6 @@ impl<M: Locate> Fitted<M> {
         }
     }
 
-    /// Locates the readings of a block; `first` is the row of its first reading, from 0.
     fn locate_block(
         &self,
         readings: &[f64],
@@ -175,7 +169,6 @@ impl<M: Locate> Fitted<M> {
 }
 
 impl BatchError {
-    /// Number of the reading, from 1; errors without a reading come last.
     fn row(&self) -> usize {
         match self {
             Self::Reading { row, .. } => *row,

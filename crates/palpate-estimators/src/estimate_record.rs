@@ -1,14 +1,13 @@
-//! An estimate in files and streams: in millimetres and newtons, without quantities that are not estimated.
+//! JSON records of estimates, in millimetres and newtons.
 
 use crate::force_prior::force_interval_95_n;
 use palpate_core::{ContactEstimate, Estimate, Mode};
 use palpate_mechanics::surface::Extent;
 use serde::Serialize;
 
-/// Quantities that trade off near an end where the force is unknown.
 const TRADE_OFF: &str = "force and position";
 
-/// An estimate as a record of JSON.
+/// JSON record of an estimate.
 ///
 /// ```
 /// use palpate_core::{Estimate, Position, Status};
@@ -22,62 +21,62 @@ const TRADE_OFF: &str = "force and position";
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EstimateRecord {
-    /// The contact: the only one, or the strongest.
+    /// Only or strongest contact.
     #[serde(flatten)]
     pub contact: ContactRecord,
     /// Name of the status.
     pub status: &'static str,
-    /// Other places that the reading fits, most probable first.
+    /// Further modes of the posterior, most probable first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub modes: Vec<ModeRecord>,
-    /// Contacts beside the first, strongest first.
+    /// Further contacts, strongest first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub further: Vec<ContactRecord>,
 }
 
-/// A contact as a record of JSON.
+/// JSON record of a contact.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ContactRecord {
-    /// Position along the surface, in mm.
+    /// Position along the surface.
     pub x_mm: f64,
-    /// Position across it, in mm; of a plane.
+    /// Position across a plane.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub y_mm: Option<f64>,
-    /// Force, in N.
+    /// Force.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force_n: Option<f64>,
-    /// Ends of the 95 % interval along the surface, in mm.
+    /// 95 % interval along the surface.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub x_95_mm: Option<[f64; 2]>,
-    /// Ends of the 95 % interval across a plane, in mm.
+    /// 95 % interval across a plane.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub y_95_mm: Option<[f64; 2]>,
-    /// Standard deviation of the position, of a plane that of the distance, in mm.
+    /// Standard deviation of the position.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sd_mm: Option<f64>,
-    /// Ends of the force's 95 % interval where force and place trade off, in N.
+    /// 95 % interval of a force that trades off with the position.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force_95_n: Option<[f64; 2]>,
-    /// The quantities that trade off, in words.
+    /// Quantities that trade off.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trade_off: Option<&'static str>,
-    /// Standard deviation of the force, in N.
+    /// Standard deviation of the force.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sd_force_n: Option<f64>,
 }
 
-/// A place that explains a reading, as a record of JSON.
+/// JSON record of a mode.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ModeRecord {
-    /// The contact there.
+    /// Contact of the mode.
     #[serde(flatten)]
     pub contact: ContactRecord,
-    /// Share of the probability, 0 to 1.
+    /// Posterior probability.
     pub probability: f64,
 }
 
 impl EstimateRecord {
-    /// The record of an estimate on a surface of this extent.
+    /// Returns the record of an estimate.
     pub fn new(estimate: &Estimate, extent: Extent) -> Self {
         let mode = |mode: &Mode| ModeRecord {
             contact: ContactRecord::new(&mode.contact, extent),
@@ -94,7 +93,7 @@ impl EstimateRecord {
 }
 
 impl ContactRecord {
-    /// The record of a contact on a surface of this extent.
+    /// Returns the record of a contact.
     pub fn new(contact: &ContactEstimate, extent: Extent) -> Self {
         let uncertainty = contact.uncertainty.as_ref();
         let mm = |(low, high): (f64, f64)| [low * 1e3, high * 1e3];
@@ -114,8 +113,7 @@ impl ContactRecord {
         }
     }
 
-    /// The 95 % interval of a force that is estimated, in N: its own where it trades off against the place, elsewhere that of a normal
-    /// distribution; `None` for a force that is known, not estimated, or undetermined.
+    /// 95 % interval of an estimated, determined force.
     pub fn force_interval_95_n(&self) -> Option<[f64; 2]> {
         let normal =
             || self.force_n.zip(self.sd_force_n).map(|(at_n, sd_n)| force_interval_95_n(at_n, sd_n).into());

@@ -1,4 +1,4 @@
-//! The two traits of estimators: [`Fit`] calibrates, [`Locate`] locates; and the locator that fitting gives.
+//! Traits of estimators and locators: [`Fit`] and [`Locate`].
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -24,23 +24,23 @@ use crate::tried::Tried;
 use crate::untouched_drift::UntouchedDrift;
 use crate::untouched_scatter::{Deviations, UntouchedScatter};
 
-/// Task of a fit: setup, recording and seed.
+/// Task of a fit.
 #[derive(Clone, Copy, Debug)]
 pub struct FitTask<'a> {
-    /// Surface, sensors, known force.
+    /// Surface, sensors and known force.
     pub setup: &'a Setup,
-    /// Readings with their contacts; as many channels as the bench has sensors, and at least one row.
+    /// Readings with contacts: a channel per sensor, at least one row.
     pub recording: &'a Recording,
-    /// Seed of the random numbers of the method.
+    /// Seed of random numbers.
     pub seed: u64,
-    /// Watch over the fit: it receives the progress, and may stop the fit.
+    /// Watch, for progress and cancellation.
     pub watch: Watch<'a>,
     /// Influence functions that fits of this setup share.
     pub(crate) memo: Option<&'a LearningMemo<'a>>,
 }
 
 impl<'a> FitTask<'a> {
-    /// A fit with seed 0, without a watch.
+    /// Returns a task with seed 0.
     pub fn new(setup: &'a Setup, recording: &'a Recording) -> Self {
         Self { setup, recording, seed: 0, watch: Watch::NONE, memo: None }
     }
@@ -62,17 +62,17 @@ impl<'a> FitTask<'a> {
         Self { memo: self.memo.or(Some(memo)), ..self }
     }
 
-    /// Checks that the recording has a channel for every sensor.
+    /// Checks for a channel per sensor.
     ///
     /// # Errors
-    /// [`ChannelMismatch`], with both numbers.
+    /// [`ChannelMismatch`].
     pub fn check_channels(&self) -> Result<(), ChannelMismatch> {
         let (needed, found) = (self.setup.layout().len(), self.recording.channels.len());
         if needed == found { Ok(()) } else { Err(ChannelMismatch { needed, found }) }
     }
 }
 
-/// A recording with another number of channels than the setup has sensors.
+/// Channel mismatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the recording has {found} channels; the bench has {needed} sensors")]
 pub struct ChannelMismatch {
@@ -82,15 +82,15 @@ pub struct ChannelMismatch {
     pub found: usize,
 }
 
-/// Queue of the seeds of pending fits, which takes their results.
+/// Queue of seeds and their results.
 pub trait SeedQueue<T> {
-    /// The seed of the next fit; `None` when all are taken.
+    /// Returns the next seed; `None` at the end.
     fn next_seed(&mut self) -> Option<u64>;
-    /// Takes the result of a fit.
+    /// Receives the result of a fit.
     fn fitted(&mut self, seed: u64, result: T);
 }
 
-/// A queue of listed seeds, which keeps the results.
+/// List of seeds with results.
 #[derive(Clone, Debug)]
 pub struct SeedList<T> {
     waiting: VecDeque<u64>,
@@ -98,12 +98,12 @@ pub struct SeedList<T> {
 }
 
 impl<T> SeedList<T> {
-    /// A queue of these seeds, in this order.
+    /// Returns a queue of these seeds.
     pub fn new(seeds: impl IntoIterator<Item = u64>) -> Self {
         Self { waiting: seeds.into_iter().collect(), fitted: Vec::new() }
     }
 
-    /// Results of the seeds that have been fitted, by rising seed.
+    /// Returns the results by rising seed.
     pub fn into_results(mut self) -> Vec<(u64, T)> {
         self.fitted.sort_by_key(|(seed, _)| *seed);
         self.fitted
@@ -120,7 +120,6 @@ impl<T> SeedQueue<T> for SeedList<T> {
     }
 }
 
-/// A queue of `U` as a queue of values that `map` converts into `U`.
 pub(crate) struct Mapped<'a, U, F> {
     pub queue: &'a mut dyn SeedQueue<U>,
     pub map: F,
@@ -136,7 +135,7 @@ impl<T, U, F: Fn(u64, T) -> U> SeedQueue<T> for Mapped<'_, U, F> {
     }
 }
 
-/// An estimator: a configured method that can be fitted.
+/// Estimator: a configured method that can be fitted.
 ///
 /// ```
 /// use palpate_estimators::arrangement::Training;
@@ -156,58 +155,56 @@ impl<T, U, F: Fn(u64, T) -> U> SeedQueue<T> for Mapped<'_, U, F> {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Fit {
-    /// The fitted method.
+    /// Fitted method.
     type Method: Locate;
     /// Error of a fit.
     type Error: From<Cancelled> + From<ChannelMismatch> + std::error::Error + Send + Sync + 'static;
 
-    /// Fits the method alone, to as many channels as the setup has sensors; see [`Fit::fit`].
+    /// Fits the method alone.
     ///
     /// # Errors
-    /// When the recording does not suit the method, or the watch stopped it.
+    /// Unsuitable recording or cancellation.
     fn fit_method(&self, task: FitTask) -> Result<Self::Method, Self::Error>;
 
-    /// Fits to a recording of a setup, with seed 0.
+    /// Fits with seed 0.
     ///
     /// # Errors
-    /// When the recording does not suit the setup or the method.
+    /// Unsuitable recording.
     fn fit(&self, setup: &Setup, recording: &Recording) -> Result<Fitted<Self::Method>, Self::Error> {
         self.fit_task(FitTask::new(setup, recording))
     }
 
-    /// Fits with a seed, watched. From 19 places on the 95 % intervals are checked at held-out places, and widened where they contain too few presses: see
-    /// [`crate::interval_check`].
+    /// Fits, and from 19 positions on checks and widens the 95 % intervals: see [`crate::interval_check`].
     ///
     /// # Errors
-    /// When the recording does not suit the setup or the method, or the watch stopped it.
+    /// Unsuitable recording or cancellation.
     fn fit_task(&self, task: FitTask) -> Result<Fitted<Self::Method>, Self::Error> {
         fit_with_interval_check(self, task)
     }
 
-    /// Fits with a seed, watched, and leaves the intervals as the method gives them.
+    /// Fits without an interval check.
     ///
     /// # Errors
-    /// When the recording does not suit the setup or the method, or the watch stopped it.
+    /// Unsuitable recording or cancellation.
     fn fit_without_interval_check(&self, task: FitTask) -> Result<Fitted<Self::Method>, Self::Error> {
         Ok(self.fit_alone(task)?.with_scatter_of(task.recording))
     }
 
-    /// Offsets of the channels at the rows of `asked` by the drift that the task's presses show; `None` where they show none.
+    /// Returns the offsets at the rows of `asked` by the drift of the task's presses.
     fn drift_course(&self, _task: FitTask, _asked: &Recording) -> Option<OffsetCourse> {
         None
     }
 
-    /// Fits with a seed, watched, without a check of the estimates, for studies of a method.
+    /// Fits without any check, for studies.
     ///
     /// # Errors
-    /// When the recording does not suit the setup or the method, or the watch stopped it.
+    /// Unsuitable recording or cancellation.
     fn fit_alone(&self, task: FitTask) -> Result<Fitted<Self::Method>, Self::Error> {
         task.check_channels()?;
         Ok(Fitted::new(task, self.fit_method(task)?))
     }
 
-    /// Fits once for every seed of a queue, to the task's recording; the task's own seed is not used. A seed gives the same locator as
-    /// [`Fit::fit_alone`] does. Some methods fit many seeds at once.
+    /// Fits every seed of a queue, equal to [`Fit::fit_alone`]; some methods fit several at once.
     ///
     /// ```
     /// use palpate_estimators::fit::{Fit, FitTask, SeedList};
@@ -225,7 +222,7 @@ pub trait Fit {
     /// ```
     ///
     /// # Errors
-    /// When the recording does not suit the setup or the method, or the watch stopped it. The queue then contains the locators fitted so far.
+    /// Unsuitable recording or cancellation, with completed locators in the queue.
     fn fit_many(
         &self,
         task: FitTask,
@@ -238,18 +235,15 @@ pub trait Fit {
     }
 }
 
-/// Number of folds in which intervals are checked: one for each place where places are few. A fold of several places leaves gaps that
-/// contacts in use do not meet. Intervals over such gaps are wide, and do not represent those between presses.
+/// One fold per position for few: larger folds would leave gaps that contacts in use do not meet.
 pub(crate) fn check_folds(places: usize) -> usize {
     const MOST_ALONE: usize = 40;
     const OF_MANY: usize = 5;
     if places <= MOST_ALONE { places } else { OF_MANY }
 }
 
-/// Presses of a fold that are located, at most.
 const MOST_PRESSES_CHECKED: usize = 400;
 
-/// The locator that an estimator fits, with the check of its intervals.
 pub(crate) fn fit_with_interval_check<E: Fit + ?Sized>(
     estimator: &E,
     task: FitTask,
@@ -261,9 +255,8 @@ pub(crate) fn fit_with_interval_check<E: Fit + ?Sized>(
     Ok(Fitted { interval_check, ..locator })
 }
 
-/// Checks the intervals of an estimator's locators at held-out places; `None` for fewer than [`FEWEST_FOR_95`] places, for a method without
-/// intervals, and where the folds cannot be fitted. A drift that the presses show is subtracted from the held-out readings, as by a tare in
-/// use.
+/// Interval check; `None` for fewer than [`FEWEST_FOR_95`] positions, no intervals, or a failed fold. Drift
+/// is subtracted, as by a tare.
 fn check_intervals<E: Fit + ?Sized>(
     estimator: &E,
     task: FitTask,
@@ -293,33 +286,28 @@ fn check_intervals<E: Fit + ?Sized>(
     }
 }
 
-/// Estimates of held-out presses, and the seconds that fits and estimates took.
 pub(crate) struct HeldOut {
     pub estimates: Vec<HeldOutEstimate>,
     pub fitting_s: f64,
     pub locating_s: f64,
 }
 
-/// Failure to fit to a split, or to locate its presses.
 pub(crate) enum HoldOutError<E> {
     Fit(E),
     Reading(ReadingError),
 }
 
-/// Splits, and what locating their held-out presses requires.
 pub(crate) struct HoldOutTask<'a> {
     pub setup: &'a Setup,
     pub splits: &'a [Split],
     pub seed: u64,
-    /// Seconds since any fixed moment.
     pub clock: &'a dyn Fn() -> f64,
     pub watch: Watch<'a>,
     pub memo: Option<&'a LearningMemo<'a>>,
 }
 
 impl HoldOutTask<'_> {
-    /// Locates the judged presses of each split with the locator that `fit` gives for its training part. `fit` receives the number of the split, and returns
-    /// seconds too: those by which the fit would take longer alone.
+    /// `fit` receives the split's number, and also returns seconds that it saved.
     pub fn run<M: Locate, E>(
         &self,
         fit: impl Fn(usize, FitTask) -> Result<(Fitted<M>, f64), E>,
@@ -346,74 +334,73 @@ impl HoldOutTask<'_> {
     }
 }
 
-/// A fitted method.
+/// Fitted method.
 pub trait Locate {
-    /// Check of its estimates that its locators may have.
+    /// Check of estimates.
     type Check: CheckEstimate;
 
-    /// Estimates the contact from a reading: one finite value a channel, in SI units or raw.
+    /// Estimates the contact of a finite reading.
     fn locate(&self, reading: &[f64]) -> Estimate;
 
-    /// Estimates the contact of each of many readings, which lie one after the other, `channels` values each, and writes over `estimates`,
-    /// one a reading. Each estimate equals that of [`Locate::locate`] to the last bit. Some methods locate many readings at once.
+    /// Estimates the contacts of consecutive readings, equal to [`Locate::locate`] to the last bit.
     fn locate_batch(&self, readings: &[f64], channels: usize, estimates: &mut [Estimate]) {
         for (reading, estimate) in readings.chunks_exact(channels).zip(estimates) {
             *estimate = self.locate(reading);
         }
     }
 
-    /// Offset of each channel, in its SI unit; `None` where the method does not learn it.
+    /// Learnt offsets in SI units; `None` without them.
     fn offsets(&self) -> Option<Vec<f64>> {
         None
     }
 
-    /// Standard deviation of each channel's noise, `None` for channels that are not in use; `None` for a method that does not learn it.
+    /// Learnt noise standard deviations of used channels.
     fn noise_sd(&self) -> Option<Vec<Option<f64>>> {
         None
     }
 
-    /// Share of untouched readings that may be mistaken for a contact; `None` for a method that does not detect untouched readings.
+    /// False-alarm rate; `None` for a method without detection.
     fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         None
     }
 
-    /// Checks the values read from a file.
+    /// Checks values from a file.
     ///
     /// # Errors
-    /// [`LocatorFault`], naming what does not fit together.
+    /// [`LocatorFault`].
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault>;
 }
 
-/// A check of estimates by other means than those of the method that made them.
+/// Check of estimates by a second method.
 pub trait CheckEstimate: Clone + Debug + PartialEq + Serialize + DeserializeOwned {
-    /// Share of untouched readings that may be mistaken for a contact; `None` for a check that does not detect untouched readings.
+    /// False-alarm rate; `None` for a check without detection.
     fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         None
     }
 
-    /// Standard deviation of each channel's noise, as [`Locate::noise_sd`].
+    /// Noise standard deviations, as [`Locate::noise_sd`].
     fn noise_sd(&self) -> Option<Vec<Option<f64>>> {
         None
     }
 
-    /// The estimate of a reading on a surface after the check.
+    /// Returns the checked estimate of a reading.
     fn checked(&self, reading: &[f64], estimate: Estimate, extent: Extent) -> Estimate;
 
-    /// Checks the estimates of many readings, which lie one after the other, `channels` values each, as [`CheckEstimate::checked`] does.
+    /// Checks the estimates of consecutive readings.
     fn check_batch(&self, readings: &[f64], channels: usize, estimates: &mut [Estimate], extent: Extent) {
         for (reading, estimate) in readings.chunks_exact(channels).zip(estimates) {
             *estimate = self.checked(reading, *estimate, extent);
         }
     }
 
-    /// Checks the values read from a file.
+    /// Checks values from a file.
     ///
     /// # Errors
-    /// [`LocatorFault`], naming what does not fit together.
+    /// [`LocatorFault`].
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault>;
 }
 
-/// The check of methods that need none.
+/// Check of methods that need none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum NoCheck {}
 
@@ -427,29 +414,29 @@ impl CheckEstimate for NoCheck {
     }
 }
 
-/// A locator: a fitted method with its setup and provenance. It contains everything that locating requires.
+/// Locator: fitted method, setup and provenance.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fitted<M: Locate> {
-    /// The surface that is touched, and its sensors.
+    /// Surface and sensors.
     pub setup: Setup,
     /// Provenance.
     pub provenance: LocatorProvenance,
-    /// The method and what it learnt.
+    /// Method with learnt parameters.
     pub method: M,
-    /// Mean reading of the recording's rows without contact, where it has some.
+    /// Mean reading of untouched rows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub untouched: Option<Vec<f64>>,
-    /// Scatter of the untouched surface from one rest to the next, where noise alone does not explain it.
+    /// Scatter of the untouched surface beyond noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub untouched_scatter: Option<UntouchedScatter>,
-    /// Drift of the untouched reading in the course of the recording, where noise alone does not explain it.
+    /// Drift of the untouched reading beyond noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub untouched_drift: Option<UntouchedDrift>,
-    /// The check of its 95 % intervals at held-out places, by which they are widened; `None` where they were not checked.
+    /// Interval check, which widens the 95 % intervals.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval_check: Option<IntervalCheck>,
-    /// The check of its estimates, where it has one.
+    /// Check of estimates.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub check: Option<Box<M::Check>>,
 }
@@ -458,19 +445,19 @@ pub struct Fitted<M: Locate> {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LocatorProvenance {
-    /// Version of palpate that fitted it.
+    /// Version of palpate.
     pub palpate: String,
     /// Seed of the fit.
     pub seed: u64,
-    /// The recording that it was fitted to.
+    /// Recording of the fit.
     pub recording: Provenance,
-    /// Estimators among which this one was chosen, itself first, then the others by rising score; empty for an estimator that was named.
+    /// Candidates of a choice, the chosen one first, by rising score.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub choice: Vec<Tried>,
 }
 
 impl<M: Locate> Fitted<M> {
-    /// The locator of a method that was fitted to a task.
+    /// Returns the locator of a fitted method.
     pub fn new(task: FitTask, method: M) -> Self {
         let provenance = LocatorProvenance {
             palpate: env!("CARGO_PKG_VERSION").to_owned(),
@@ -491,7 +478,7 @@ impl<M: Locate> Fitted<M> {
         }
     }
 
-    /// Converts the method to another type, and removes the check of its estimates.
+    /// Converts the method, without the check of estimates.
     pub fn map<N: Locate>(self, convert: impl FnOnce(M) -> N) -> Fitted<N> {
         let Self { setup, provenance, method, untouched, untouched_scatter, untouched_drift, .. } = self;
         Fitted {
@@ -506,17 +493,17 @@ impl<M: Locate> Fitted<M> {
         }
     }
 
-    /// The sensors, a channel of a reading each.
+    /// Sensors, one per channel.
     pub fn layout(&self) -> &Layout {
         self.setup.layout()
     }
 }
 
 impl<M: Locate> Fitted<M> {
-    /// Estimates the contact from a reading: one value a channel, in SI units or raw.
+    /// Estimates the contact of a reading.
     ///
     /// # Errors
-    /// [`ReadingError`] for another number of channels or a value that is not finite.
+    /// [`ReadingError`].
     pub fn locate(&self, reading: &[f64]) -> Result<Estimate, ReadingError> {
         ReadingError::check(reading, self.setup.layout().len())?;
         let extent = self.setup.surface().extent();
@@ -528,7 +515,6 @@ impl<M: Locate> Fitted<M> {
         Ok(self.finished(estimate, reading))
     }
 
-    /// The estimate of the method, after its check, as the locator gives it.
     pub(crate) fn finished(&self, estimate: Estimate, reading: &[f64]) -> Estimate {
         let estimate = match &self.interval_check {
             Some(check) => check.widening().widened(estimate, self.setup.surface().extent()),
@@ -537,12 +523,10 @@ impl<M: Locate> Fitted<M> {
         self.by_scatter(limited(estimate, reading, &self.setup), reading)
     }
 
-    /// The estimate of a reading that no contact explains.
     pub(crate) fn anywhere(&self) -> Estimate {
         anywhere_on(self.setup.surface().extent())
     }
 
-    /// The estimate with the status `no_contact` where the reading is within the scatter of the untouched surface.
     fn by_scatter(&self, estimate: Estimate, reading: &[f64]) -> Estimate {
         match &self.untouched_scatter {
             Some(scatter) if estimate.status != Status::NoContact && scatter.contains(reading) => {
@@ -552,9 +536,8 @@ impl<M: Locate> Fitted<M> {
         }
     }
 
-    /// Adds the scatter of the untouched rows of the recording that the locator was fitted to, where its noise does not explain it at the 5
-    /// % level. A scatter that hides most presses is not that of an untouched surface, and is omitted. A method without a rule of
-    /// `no_contact` uses the scatter as its rule. Without rests, the scatter is then that of single untouched rows, or of repeats.
+    /// Adds the scatter of untouched rows beyond noise (5 % level), unless it hides most presses. A method
+    /// without detection takes it as its rule, without rests from single rows or repeats.
     #[must_use]
     pub fn with_scatter_of(self, recording: &Recording) -> Self {
         let of_check = || self.check.as_ref()?.false_alarm_rate();
@@ -571,14 +554,13 @@ impl<M: Locate> Fitted<M> {
         self.with_scatter(scatter, recording)
     }
 
-    /// Standard deviation of each channel's noise by the method, its check or the layout; `None` for a channel that is not in use.
+    /// Noise standard deviations of used channels.
     pub(crate) fn noise_sd(&self) -> Option<Vec<Option<f64>>> {
         let of_check = || self.check.as_ref()?.noise_sd();
         let of_layout = || self.setup.layout().reading_sds().ok();
         self.method.noise_sd().or_else(of_check).or_else(of_layout)
     }
 
-    /// The locator with a scatter, unless this hides most presses.
     fn with_scatter(self, scatter: UntouchedScatter, recording: &Recording) -> Self {
         const MOST_HIDDEN: f64 = 0.5;
         let presses = || recording.rows.iter().filter(|row| row.touches());
@@ -587,10 +569,10 @@ impl<M: Locate> Fitted<M> {
         Self { untouched_scatter: if is_right { Some(scatter) } else { self.untouched_scatter }, ..self }
     }
 
-    /// Checks the values read from a file.
+    /// Checks values from a file.
     ///
     /// # Errors
-    /// [`LocatorFault`], naming what does not fit together.
+    /// [`LocatorFault`].
     pub fn check(&self) -> Result<(), LocatorFault> {
         if let Some(untouched) = &self.untouched {
             LocatorFault::check_count("untouched channels", self.setup.layout().len(), untouched.len())?;
@@ -612,17 +594,17 @@ impl<M: Locate> Fitted<M> {
     }
 }
 
-/// Largest size of a number of a locator, as of a reading.
+/// Largest magnitude of a number.
 pub(crate) const LARGEST: f64 = palpate_core::LARGEST_READING;
 
-/// The estimate that a locator returns for a reading: finite, and `located` only where the reading restricts the position.
+/// Makes an estimate finite, and `located` only for a restricted position.
 fn limited(estimate: Estimate, reading: &[f64], setup: &Setup) -> Estimate {
     let extent = setup.surface().extent();
     let is_absurd = |(value, sensor): (&f64, &Sensor)| value.abs() > LARGEST && !sensor.channel.dead;
     if reading.iter().zip(setup.layout().sensors()).any(is_absurd) {
         return anywhere_on(extent);
     }
-    // Where no contact explains a reading, and all are infinitely far from it, no contact excludes another.
+    // Where every contact is infinitely far from a reading, no contact excludes another.
     let is_point = estimate.status == Status::OutsideModel
         && estimate
             .contact
@@ -635,8 +617,7 @@ fn limited(estimate: Estimate, reading: &[f64], setup: &Setup) -> Estimate {
     }
 }
 
-/// The estimate in place of one with a value that is not a number, as for readings far beyond the range of a sensor: no contact explains
-/// the reading, and no position of the surface is excluded.
+/// Estimate `outside_model` in place of an infinite one.
 fn anywhere_on(extent: Extent) -> Estimate {
     let (length_m, width_m) = (extent.length_m(), extent.width_m().unwrap_or(0.0));
     let uniform = |side_m: f64| side_m * side_m / 12.0;
@@ -651,7 +632,7 @@ fn anywhere_on(extent: Extent) -> Estimate {
     Estimate::of_contact(contact, Status::OutsideModel)
 }
 
-/// An invalid reading.
+/// Invalid reading.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ReadingError {
     /// Another number of channels.
@@ -662,10 +643,10 @@ pub enum ReadingError {
         /// Channels of the reading.
         found: usize,
     },
-    /// A value that is not a number.
+    /// Value that is not finite.
     #[error("channel {channel} reads {value}; it must be a finite number")]
     NotFinite {
-        /// Which channel, from 1.
+        /// Channel number, from 1.
         channel: usize,
         /// Value.
         value: f64,
@@ -673,10 +654,10 @@ pub enum ReadingError {
 }
 
 impl ReadingError {
-    /// Checks that a reading has `needed` values, all finite.
+    /// Checks for `needed` finite values.
     ///
     /// # Errors
-    /// [`ReadingError`], naming the first that is not.
+    /// [`ReadingError`].
     pub fn check(reading: &[f64], needed: usize) -> Result<(), Self> {
         let found = reading.len();
         if needed != found {

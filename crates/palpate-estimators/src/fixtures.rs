@@ -1,4 +1,4 @@
-//! Setups that tests of several modules share: those of the examples, as values.
+//! Shared setups of tests, as in the examples.
 
 mod covered;
 
@@ -20,7 +20,6 @@ use crate::estimate_record::ContactRecord;
 use crate::recording::{Columns, Frame, Recording, Row};
 use crate::setup::Setup;
 
-/// A setup, and how it is pressed to calibrate.
 #[derive(Clone, Debug)]
 pub(crate) struct Example {
     pub setup: Setup,
@@ -37,25 +36,22 @@ impl Example {
     }
 }
 
-/// The founding paper's beam.
 pub(crate) fn beam() -> Beam {
     Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0)).unwrap()
 }
 
-/// The founding paper's beam with eight deflection sensors, pressed with its known force at ten places.
+/// Eight deflection sensors, ten positions, known force.
 pub(crate) fn paper(noise_m: f64, repeats: usize) -> Example {
     faulty_paper(ChannelModel { noise_sd: noise_m, ..ChannelModel::default() }, repeats)
 }
 
-/// The setup of [`paper`] with these faults of every channel.
 pub(crate) fn faulty_paper(channel: ChannelModel, repeats: usize) -> Example {
     let setup = Setup::new(beam()).sensors(Deflection.evenly(8).channel(channel));
     let setup = setup.and_then(|setup| setup.known_force(newtons(3.0))).unwrap();
     Example { setup, training: Training::even(10).repeated(repeats) }
 }
 
-/// A steel plate, simply supported all around, over this grid of deflection sensors; pressed with its known force at 6 × 6
-/// places, five times each.
+/// Steel plate, pressed at 6 × 6 positions, five times each.
 pub(crate) fn plate(elements: usize, channel: ChannelModel) -> Example {
     let plate = Plate::simply_supported((mm(300.0), mm(300.0)), mm(0.8), gpa(200.0), 0.3);
     let plate = plate.and_then(|plate| plate.with_elements(elements));
@@ -64,7 +60,7 @@ pub(crate) fn plate(elements: usize, channel: ChannelModel) -> Example {
     Example { setup, training: Training::grid(6, 6).repeated(5) }
 }
 
-/// A finger with five strain gauges and contacts of unknown force, pressed with `force_n` at 24 places, twice each.
+/// Five strain gauges, pressed at 24 positions, twice each.
 pub(crate) fn digit(direction: ForceDirection, force_n: f64) -> Example {
     let digit = Digit::new(mm(120.0), mm(10.0), mm(0.5), gpa(200.0)).unwrap().with_direction(direction);
     let gauges = Strain.at_x([4.0, 20.0, 40.0, 60.0, 80.0].map(mm)).noise(microstrain(1.0));
@@ -72,33 +68,28 @@ pub(crate) fn digit(direction: ForceDirection, force_n: f64) -> Example {
     Example { setup, training: Training::even(24).repeated(2).with_force(force_n) }
 }
 
-/// To and fro four times between two places, at 0.5 m/s.
 pub(crate) fn to_and_fro(from: Position, to: Position) -> Motion {
     Motion::new(from, to, 0.5, mm(100.0)).and_then(|motion| motion.with_passes(4)).unwrap()
 }
 
-/// The motion of a load along the paper's beam.
 pub(crate) fn along_the_beam() -> Motion {
     to_and_fro(Position::along(mm(50.0)), Position::along(mm(350.0)))
 }
 
-/// The motion of a contact over the plate.
 pub(crate) fn over_the_plate() -> Motion {
     let at = |x: f64, y: f64| Position { x_m: mm(x), y_m: mm(y) };
     to_and_fro(at(50.0, 80.0), at(250.0, 210.0))
 }
 
-/// The paper's beam of steel, which vibrates.
 pub(crate) fn swinging_beam() -> ModalBeam {
     ModalBeam::new(beam(), 7850.0, 0.01).unwrap()
 }
 
-/// The paper's beam as it is calibrated to follow a moving load.
 pub(crate) fn moving_beam() -> Example {
     paper(um(20.0), 50)
 }
 
-/// Two loads on the paper's beam, read by deflections and strains; their forces are not known.
+/// Deflections and strains; unknown forces.
 pub(crate) fn two_moving_loads() -> (Example, [Motion; 2]) {
     let setup = Setup::new(beam())
         .sensors(Deflection.evenly(8).noise(um(20.0)))
@@ -113,21 +104,20 @@ pub(crate) fn two_moving_loads() -> (Example, [Motion; 2]) {
     (Example { setup: setup.unwrap(), training }, [motion(60.0, 150.0, 0.2, 6), second])
 }
 
-/// The plate on a mesh that is solved at once, as it is calibrated to follow a contact that slides over it.
 pub(crate) fn moving_plate() -> Example {
     let mut example = plate(24, ChannelModel { noise_sd: um(20.0), ..ChannelModel::default() });
     example.training = Training::grid(6, 6).repeated(50);
     example
 }
 
-/// A strip over a channel with two pressure sensors, known by recordings only.
+/// Two pressure sensors.
 pub(crate) fn strip() -> Setup {
     let depth = Unit::from_symbol("mm").unwrap();
     let columns = Columns::along("X", ["Pl", "Pr"]).force("F").nuisance("depth", depth);
     Setup::measured(mm(100.0), &["Pl", "Pr"]).unwrap().recorded_as(columns)
 }
 
-/// A magnetic pad of fifteen channels, known by recordings only.
+/// Fifteen channels.
 pub(crate) fn pad() -> Setup {
     let names: Vec<String> = (1..=15).map(|i| format!("raw_{i}")).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
@@ -136,19 +126,17 @@ pub(crate) fn pad() -> Setup {
     Setup::measured_plane(mm(30.0), mm(30.0), &names).unwrap().recorded_as(columns)
 }
 
-/// A bench without a model, read by raw channels.
 pub(crate) fn raw_setup(extent: Extent, channels: usize, force_n: Option<f64>) -> Setup {
     let layout = Layout::even(SensorKind::Raw, channels, extent.length_m());
     Setup::new(extent).with_layout(layout).unwrap().with_force(force_n).unwrap()
 }
 
-/// A recording of such a bench.
 pub(crate) fn raw_recording(rows: Vec<Row>) -> Recording {
     let channels = rows.first().map_or(0, |row| row.reading.len());
     Recording::new(&Layout::even(SensorKind::Raw, channels, 1.0), "test", rows)
 }
 
-/// The strip and a recording of it, from the folder of real recordings; `None`, reported in one line, where the folder is absent.
+/// `None` without the folder of real recordings.
 pub(crate) fn strip_recording(file: &str) -> Option<(Setup, Recording)> {
     let path = data::recording(&format!("tactile-fsi/{file}"))?;
     let setup = strip();
@@ -156,7 +144,6 @@ pub(crate) fn strip_recording(file: &str) -> Option<(Setup, Recording)> {
     Some((setup, recording))
 }
 
-/// The pad and its recording, from the same folder.
 pub(crate) fn pad_recording() -> Option<(Setup, Recording)> {
     let [readings, contacts] = ["readings", "contacts"].map(|name| {
         let path = data::recording(&format!("eflesh/fixed-depth-{name}.csv"))?;
@@ -168,7 +155,7 @@ pub(crate) fn pad_recording() -> Option<(Setup, Recording)> {
     Some((setup, recording))
 }
 
-/// A soft sheet over two channels, with the rise time and the pressure at the end of each, and its recording, from the same folder.
+/// Rise time and final pressure of two soft channels.
 pub(crate) fn sheet_recording() -> Option<(Setup, Recording)> {
     let path = data::recording("tactile-fsi/2d-sheet-part.csv")?;
     let channels = ["Tl", "Tr", "Pl", "Pr"];
@@ -178,7 +165,6 @@ pub(crate) fn sheet_recording() -> Option<(Setup, Recording)> {
     Some((setup, recording))
 }
 
-/// The 95 % interval of a contact's force: its own, or that of a normal distribution. Both ends are the force where it is known.
 pub(crate) fn force_95_n(contact: &ContactEstimate) -> (f64, f64) {
     let of_any_line = Extent::line(1.0).unwrap();
     let known_n = contact.force_n.unwrap();

@@ -1,10 +1,8 @@
-//! Prior of the unknown force of a contact: one for the estimators, the tracker and the status of readings.
+//! Prior of the unknown force of a contact.
 //!
-//! A [`ForceRange`] (W₁, W₂) is a log-normal distribution, ln W ~ N(μ, s²) with the quantiles W₁ at 0.5 % and W₂ at 99.5 %, cut off at W₂. Over
-//! several decades it is nearly flat in ln W: a place where the surface is stiff, and a greater force has to explain the reading, is as probable as
-//! any other. A prior flat in W would prefer the stiff places beside supports, in proportion to the force that they need.
-//!
-//! Locators of files without a range have a normal prior, that of the presses.
+//! A [`ForceRange`] (W₁, W₂) is log-normal, ln W ~ N(μ, s²), with quantiles W₁ at 0.5 % and W₂ at 99.5 %,
+//! truncated at W₂. A prior flat in W would prefer stiff positions beside supports. Locator files without a
+//! range have a normal prior.
 
 mod cut_normal;
 mod log_normal;
@@ -15,7 +13,7 @@ pub(crate) use log_normal::LogNormalPrior;
 use palpate_numerics::{OutOfRange, normal_interval_95};
 use serde::{Deserialize, Serialize};
 
-/// Range of the forces of contacts, in newtons: 1 in 200 is less than its lower end, and none is greater than its upper end.
+/// Range of contact forces in newtons, from the 0.5 % quantile to the maximum.
 ///
 /// ```
 /// use palpate_estimators::force_prior::ForceRange;
@@ -33,18 +31,17 @@ pub struct ForceRange {
     greatest_n: f64,
 }
 
-/// Where readings are proportional to the force, contacts may be so many times lighter or harder than the presses of the calibration: a decade.
+/// Ratio of contact forces to press forces.
 pub(crate) const DECADE: f64 = 10.0;
 
-/// Ratio of the greatest to the least force of presses below which they count as presses of one force. A policy: over a smaller ratio, a
-/// saturation of some percent and a varying hand are indistinguishable.
+/// Ratio of press forces up to which they count as one, a policy: saturation resembles a varying hand.
 pub(crate) const ONE_WEIGHT: f64 = 1.5;
 
 impl ForceRange {
-    /// From a least to a greatest force, in newtons.
+    /// Returns a range in newtons.
     ///
     /// # Errors
-    /// [`OutOfRange`] for an end that is not greater than 0 and finite, and an upper end that is not greater than the lower one.
+    /// [`OutOfRange`] unless 0 < least < greatest, both finite.
     pub fn new(least_n: f64, greatest_n: f64) -> Result<Self, OutOfRange> {
         const UPPER: &str = "the upper end of the force range in newtons";
         let ends = [("the lower end of the force range in newtons", least_n), (UPPER, greatest_n)];
@@ -53,10 +50,10 @@ impl ForceRange {
         Ok(Self { least_n, greatest_n })
     }
 
-    /// From a decade below to a decade above the mean force of presses, in newtons, extended to include all presses; `None` without a press.
+    /// Returns a decade below to a decade above the mean press force, extended to all presses.
     ///
-    /// Readings that are proportional to the force have the same directions at any force, so extrapolation is safe there. Another function
-    /// of the force is calibrated over the presses alone, and contacts are expected to be about as hard as these.
+    /// For readings in proportion to the force, which keep their direction; others are calibrated over the
+    /// presses alone.
     pub fn of_presses(forces_n: impl Iterator<Item = f64>) -> Option<Self> {
         let (mut sum_n, mut count, mut least_n, mut greatest_n) = (0.0, 0.0, f64::INFINITY, 0.0f64);
         for force_n in forces_n {
@@ -67,7 +64,7 @@ impl ForceRange {
         Self::new(least_n.min(mean_n / DECADE), greatest_n.max(mean_n * DECADE)).ok()
     }
 
-    /// Lower and upper end, in newtons.
+    /// Ends.
     pub fn ends_n(self) -> (f64, f64) {
         (self.least_n, self.greatest_n)
     }
@@ -87,35 +84,32 @@ impl From<ForceRange> for (f64, f64) {
     }
 }
 
-/// Prior of an unknown force, or of another quantity in newtons that is a power of it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum ForcePrior {
     Normal(NormalPrior),
     LogNormal(LogNormalPrior),
 }
 
-/// Likelihood exp(−½·M(W)) of a force W at a place, with the squared residual M(W) = M(0) − 2·b·W + a·W², in variances.
+/// Likelihood exp(−½·M(W)), M(W) = M(0) − 2·b·W + a·W² in variances.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ForceLikelihood {
     pub b: f64,
     pub a: f64,
-    /// A force, and M there.
     pub at_n: f64,
     pub misfit: f64,
 }
 
-/// Posterior of a force at a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ForceIntegral {
-    /// −2·ln of the greatest value of prior times likelihood, and of the width about it, up to a constant of the prior. Their sum is −2·ln of the
-    /// integral; infinite where the integral is not a number.
+    /// −2·ln of the maximum and of the width of prior times likelihood, up to a constant; infinite for an
+    /// invalid integral.
     pub peak_cost: f64,
     pub width_cost: f64,
     pub mean_n: f64,
     pub variance_n2: f64,
 }
 
-/// Expansion of −2·ln of a prior's density about a force, up to a constant, as least squares of one residual r.
+/// −2·ln prior as the square of a residual r, up to a constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PriorTerms {
     /// r².
@@ -133,7 +127,6 @@ impl From<ForceRange> for ForcePrior {
 }
 
 impl ForcePrior {
-    /// The least force that matters, and the greatest that is possible, in newtons.
     pub fn ends_n(&self) -> (f64, f64) {
         match self {
             Self::Normal(prior) => (0.0, prior.greatest_n),
@@ -141,7 +134,7 @@ impl ForcePrior {
         }
     }
 
-    /// Expansion about a force; that of a log-normal prior is the expansion of the density of ln W.
+    /// For a log-normal prior, of the density of ln W.
     pub fn terms(&self, force_n: f64) -> PriorTerms {
         match self {
             Self::Normal(prior) => prior.terms(force_n),
@@ -149,7 +142,6 @@ impl ForcePrior {
         }
     }
 
-    /// Point estimate of the force by the [likelihood](ForceLikelihood) of these b and a.
     pub fn estimate_n(&self, b: f64, a: f64) -> f64 {
         match self {
             Self::Normal(prior) => prior.estimate_n(b, a),
@@ -157,7 +149,6 @@ impl ForcePrior {
         }
     }
 
-    /// The integral of prior and likelihood, with mean and variance of the force.
     pub fn integrate(&self, likelihood: ForceLikelihood) -> ForceIntegral {
         match self {
             Self::Normal(prior) => prior.integrate(likelihood),
@@ -166,7 +157,7 @@ impl ForcePrior {
     }
 }
 
-/// The 95 % interval of a force by a normal distribution, in newtons. Contacts press: the interval of a force that presses ends at 0.
+/// Returns the 95 % interval of a normal force; at least 0 for a positive force.
 ///
 /// ```
 /// use palpate_estimators::force_prior::force_interval_95_n;

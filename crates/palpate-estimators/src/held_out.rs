@@ -1,4 +1,4 @@
-//! Uncertainty from errors at positions that a method was not fitted to.
+//! Uncertainty from cross-validated errors.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,22 +7,20 @@ use palpate_core::Uncertainty;
 use palpate_mechanics::contact::Position;
 use palpate_numerics::{conformal_95, root_mean_square};
 
-/// Errors of a method at positions that it was not fitted to: an uncertainty for methods without a noise model.
-///
-/// The half-width of the 95 % interval is the conformal one (Vovk, Gammerman and Shafer 2005): of n absolute errors in rising order, number
-/// ⌈0.95·(n + 1)⌉, which covers a further contact like those held out with probability at least 0.95.
+/// Cross-validated errors, with conformal half-widths of the 95 % interval: number ⌈0.95·(n + 1)⌉ of n sorted
+/// absolute errors (Vovk, Gammerman and Shafer 2005).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HeldOutErrors {
-    /// Root mean square error along x and y, in metres.
+    /// Root mean square error along x and y.
     pub rms_m: [f64; 2],
-    /// Half-width of the 95 % interval along x and y, in metres.
+    /// Half-width of the 95 % interval along x and y.
     pub half_95_m: [f64; 2],
 }
 
 impl HeldOutErrors {
-    /// The uncertainty by errors (x, y) in metres; `None` for fewer than [`FEWEST_FOR_95`](palpate_numerics::FEWEST_FOR_95), which bound no
-    /// 95 % interval.
+    /// Computes the uncertainty; `None` for fewer than [`FEWEST_FOR_95`](palpate_numerics::FEWEST_FOR_95)
+    /// errors.
     pub fn from_errors(errors_m: &[[f64; 2]]) -> Option<Self> {
         let axis = |axis: usize| {
             let sizes: Vec<f64> = errors_m.iter().map(|error| error[axis].abs()).collect();
@@ -32,7 +30,7 @@ impl HeldOutErrors {
         Some(Self { rms_m: [rms_x, rms_y], half_95_m: [half_x, half_y] })
     }
 
-    /// The uncertainty of an estimate at `position`.
+    /// Returns the uncertainty at `position`.
     pub fn uncertainty(&self, position: Position) -> Uncertainty {
         let [half_x, half_y] = self.half_95_m;
         Uncertainty {
@@ -43,10 +41,10 @@ impl HeldOutErrors {
         }
     }
 
-    /// Checks the values read from a file.
+    /// Checks values from a file.
     ///
     /// # Errors
-    /// [`LocatorFault::BadNumber`] for a number that is negative or not finite.
+    /// [`LocatorFault::BadNumber`].
     pub fn check(&self) -> Result<(), LocatorFault> {
         let numbers = self.rms_m.into_iter().chain(self.half_95_m);
         LocatorFault::check_numbers("held-out error", numbers, |x| x >= 0.0, "a number of at least 0")

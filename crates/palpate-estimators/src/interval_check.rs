@@ -1,24 +1,17 @@
-//! Check of 95 % intervals at places that a locator was not fitted to, and their widening.
+//! Check and widening of 95 % intervals at held-out positions.
 //!
-//! Intervals are valid where the bench fulfils the assumptions of the method. Presses at held-out places test this: a locator of the same
-//! estimator, fitted to the other folds, locates them. With up to 40 places, each place is a fold.
-//!
-//! Two numbers widen intervals: a standard deviation τ that is added to each one's own, and a factor. With the half-width h of an interval, the wider one has
-//! factor·√(h² + (1.96·τ)²); an ellipse of the covariance C has factor²·(C + τ²·I). The added standard deviation represents errors that the
-//! method does not model, such as presses beside their places. Without it, a factor that is right for wide intervals is too small for
-//! narrow ones (Papadopoulos, Vovk and Gammerman, *Journal of Artificial Intelligence Research* 40, 2011, normalize residuals alike). τ is
-//! the value with which normal errors of the widened standard deviations, times any factor, are most likely. It is added where it raises
-//! the log-likelihood by more than 1, the price of a parameter (Akaike, *IEEE Transactions on Automatic Control* 19, 1974), with each place
-//! counted once.
-//!
-//! The ratio of a press is the least factor by which its interval contains it, lengthened to both sides alike (Romano, Patterson and Candès, *NeurIPS*, 2019:
-//! conformalized quantile regression); on a plane, the square root of (e − t)ᵀ·C⁻¹·(e − t) over that of [`ELLIPSE_95`]. The factor is the 95 % quantile of
-//! the ratios, with the correction for their number by which it covers a press at a further place with a probability of 0.95 (cross-conformal
-//! prediction: Vovk, *Annals of Mathematics and Artificial Intelligence* 74, 2015; the jackknife+ and CV+: Barber and others, *Annals of Statistics* 49, 2021).
-//! Presses of one place may share an error, so places are counted, not presses: see [`conformal_95_of_groups`]. Fewer than
-//! [`FEWEST_FOR_95`] places give no bound.
-//!
-//! Intervals are widened, and never narrowed: the factor of few places scatters, and the intervals of a valid method need no factor.
+//! - A locator fitted to the other folds locates each fold's presses; up to 40 positions are a fold each.
+//! - A half-width h becomes factor·√(h² + (1.96·τ)²), an ellipse's covariance C factor²·(C + τ²·I). τ
+//!   represents unmodelled errors, which a factor understates in narrow intervals (normalized residuals:
+//!   Papadopoulos, Vovk and Gammerman, *Journal of Artificial Intelligence Research* 40, 2011). It maximizes
+//!   a normal likelihood, each position counted once, with a gain above 1 (Akaike, *IEEE Transactions on
+//!   Automatic Control* 19, 1974).
+//! - The ratio of a press is the least factor to contain it (Romano, Patterson and Candès, *NeurIPS*, 2019),
+//!   on a plane the root of (e − t)ᵀ·C⁻¹·(e − t) over that of [`ELLIPSE_95`]. The factor is the conformal 95
+//!   % quantile over positions (Vovk, *Annals of Mathematics and Artificial Intelligence* 74, 2015; Barber
+//!   and others, *Annals of Statistics* 49, 2021), as presses of one share errors:
+//!   [`conformal_95_of_groups`]. Fewer than [`FEWEST_FOR_95`] give none.
+//! - Intervals are never narrowed, as factors of few positions scatter.
 
 mod region;
 mod widening;
@@ -35,32 +28,32 @@ use serde::{Deserialize, Serialize};
 pub(crate) use widening::EstimateWidening;
 use widening::Widening;
 
-/// Check of a locator's 95 % intervals at held-out places; see [the module](self).
+/// Check of 95 % intervals; see [the module](self).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct IntervalCheck {
-    /// Number of places.
+    /// Number of positions.
     pub places: usize,
-    /// Number of presses at these places.
+    /// Number of presses.
     pub presses: usize,
-    /// Number of them that are `outside_model`. Their intervals count too: a press is one contact, also where the model does not explain it.
+    /// Number of `outside_model` presses.
     pub outside_model: usize,
-    /// Intervals of the position; on a plane, its ellipse.
+    /// Coverage of position intervals or ellipses.
     pub position: Coverage,
-    /// Intervals of the force, where it is estimated and was recorded.
+    /// Coverage of force intervals.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force: Option<Coverage>,
 }
 
-/// Coverage of intervals at held-out places, and their widening.
+/// Coverage and widening of intervals.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Coverage {
-    /// Share of the presses that the method's intervals contain, in %. Every place has the same weight.
+    /// Coverage of the method's intervals, by position.
     pub before_percent: f64,
-    /// Share of the presses that intervals widened by the other folds contain, in %. Every place has the same weight.
+    /// Coverage of intervals widened by other folds.
     pub after_percent: f64,
-    /// Standard deviation that is added to that of each estimate, in metres or newtons.
+    /// Added standard deviation τ, in metres or newtons.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub added_sd: f64,
     /// Factor of the half-widths, at least 1.
@@ -71,18 +64,15 @@ fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
-/// Estimate of a press at a place that its locator was not fitted to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct HeldOutEstimate {
     pub truth: Position,
     pub force_n: Option<f64>,
     pub estimate: Estimate,
-    /// Number of its fold.
     pub fold: usize,
 }
 
 impl IntervalCheck {
-    /// The check by estimates at held-out places; `None` for fewer than [`FEWEST_FOR_95`] places, and for a method without intervals.
     pub(crate) fn of_estimates(estimates: &[HeldOutEstimate], extent: Extent) -> Option<Self> {
         let positions = PlaceRegions::new(estimates, |held_out| Region::of_position(held_out, extent));
         let forces = PlaceRegions::new(estimates, |held_out| Region::of_force(held_out, extent));
@@ -98,23 +88,22 @@ impl IntervalCheck {
         })
     }
 
-    /// Share of the presses that are `outside_model`, in %, where noise alone does not explain their number; `None` elsewhere.
+    /// Share of `outside_model` presses beyond noise.
     pub fn outside_model_percent(&self) -> Option<f64> {
         let Self { presses, outside_model, .. } = *self;
         let by_noise = binomial_tail(presses, outside_model, OUTSIDE_MODEL_RATE + SPREAD_RATE);
         (by_noise < SIGNIFICANCE).then(|| 100.0 * outside_model as f64 / presses as f64)
     }
 
-    /// Widening of the intervals of estimates.
     pub(crate) fn widening(&self) -> EstimateWidening {
         let force = self.force.map_or(Widening::NONE, |force| force.widening());
         EstimateWidening { position: self.position.widening(), force }
     }
 
-    /// Checks the values read from a file.
+    /// Checks values from a file.
     ///
     /// # Errors
-    /// [`LocatorFault`], naming what does not fit together.
+    /// [`LocatorFault`].
     pub fn check(&self) -> Result<(), LocatorFault> {
         let coverages = || [self.position].into_iter().chain(self.force);
         let factors = coverages().map(|coverage| coverage.factor);
@@ -146,7 +135,6 @@ impl Coverage {
     }
 }
 
-/// Widens each estimate by the check of the other folds. Estimates stay unchanged where these have too few places.
 pub(crate) fn widen_by_other_folds(estimates: &mut [HeldOutEstimate], extent: Extent) {
     let last = estimates.iter().map(|held_out| held_out.fold).max();
     let of_others = |fold: usize| {
@@ -163,15 +151,12 @@ pub(crate) fn widen_by_other_folds(estimates: &mut [HeldOutEstimate], extent: Ex
     }
 }
 
-/// Regions of the presses of each place, with the fold of the place.
 struct PlaceRegions {
     groups: Vec<(usize, Vec<Region>)>,
-    /// Number of places where all presses are `no_contact`, and so have no interval.
     not_found: usize,
 }
 
 impl PlaceRegions {
-    /// The regions of the estimates that have one.
     fn new(estimates: &[HeldOutEstimate], region_of: impl Fn(&HeldOutEstimate) -> Option<Region>) -> Self {
         let mut sorted: Vec<&HeldOutEstimate> = estimates.iter().collect();
         sorted.sort_by(|a, b| a.truth.cmp_by_x_then_y(&b.truth));
@@ -200,9 +185,7 @@ impl PlaceRegions {
         })
     }
 
-    /// Widening of intervals by all places except those of a fold; `None` for too few places.
     fn widening_without(&self, fold: Option<usize>) -> Option<Widening> {
-        /// Added standard deviations that are tried, in powers of √2 of the root mean square error.
         const TRIED: std::ops::RangeInclusive<i32> = -10..=6;
         let others: Vec<&[Region]> = self
             .groups
@@ -226,8 +209,7 @@ impl PlaceRegions {
         Some(best)
     }
 
-    /// The 95 % quantile of the ratios of some places; `None` for too few. Where fewer than [`FEWEST_FOR_95`] places have an interval,
-    /// places without a detection complete their number, and the factor is about the largest ratio.
+    /// Undetected positions complete the number of few.
     fn factor(&self, places: &[&[Region]], added_sd: f64) -> Option<f64> {
         let ratios_of = |group: &&[Region]| group.iter().map(|region| region.ratio(added_sd)).collect();
         let mut ratios: Vec<Vec<f64>> = places.iter().map(ratios_of).collect();
@@ -236,7 +218,6 @@ impl PlaceRegions {
         conformal_95_of_groups(&ratios.iter().map(Vec::as_slice).collect::<Vec<_>>())
     }
 
-    /// Share of the presses that widened intervals contain, in %; every place counts alike.
     fn covered_percent(&self, widening_of: impl Fn(usize) -> Widening) -> f64 {
         let of_place = |(fold, regions): &(usize, Vec<Region>)| {
             let Widening { added_sd, factor } = widening_of(*fold);
@@ -247,11 +228,10 @@ impl PlaceRegions {
     }
 }
 
-/// Price of a parameter in the log-likelihood, by Akaike's criterion.
+/// Akaike's price.
 const PRICE_OF_A_PARAMETER: f64 = 1.0;
 
-/// Log-likelihood of the errors at some places, each counted once, where they are normal with the standard deviations of the intervals and
-/// the added one, times the most likely factor. A constant is omitted; −∞ where an error lies in an interval without a length.
+/// Log-likelihood, each position counted once; −∞ for an error in an interval of length 0.
 fn log_likelihood(places: &[&[Region]], added_sd: f64) -> f64 {
     let (mut log_sizes, mut squares, mut dimensions) = (0.0, 0.0, 0.0);
     for place in places {
@@ -266,7 +246,7 @@ fn log_likelihood(places: &[&[Region]], added_sd: f64) -> f64 {
     if log_likelihood.is_finite() { log_likelihood } else { f64::NEG_INFINITY }
 }
 
-/// Factor from which intervals count as unbounded. A policy: an interval of a micrometre is then a metre long. Files keep finite numbers.
+/// Factor of unbounded intervals, a policy.
 pub const UNBOUNDED: f64 = 1e6;
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
-//! From recordings to locators: setups, recordings, every estimator, tracking, load profiles, evaluation.
+//! Setups, recordings, estimators, tracking, load profiles and evaluation.
 //!
-//! A [`Setup`](setup::Setup) is a surface with its sensors. A [`Recording`](recording::Recording) of it is read from a file or
-//! [simulated](simulate). An estimator is fitted to the recording ([`Fit`](fit::Fit)), which gives a locator ([`Locate`](fit::Locate)). The
-//! locator is judged by [`evaluation`], tracks contacts over time in [`tracking`], and is kept in a file by [`estimator`].
+//! [`Fit`](fit::Fit) turns a [`Recording`](recording::Recording) of a [`Setup`](setup::Setup), read or
+//! [simulated](simulate), into a locator ([`Locate`](fit::Locate)) for [`evaluation`], [`tracking`] and
+//! [`estimator`] files.
 //!
 //! ```
 //! use palpate_estimators::arrangement::Training;

@@ -1,15 +1,12 @@
-//! The smallest detectable force: the force from which a contact is detected at a given false-alarm rate.
-//!
-//! The detection probability follows from the contact's signal-to-noise ratio, by the rule of `no_contact` ([`crate::status`]). A locator
-//! with the scatter of untouched rows detects a contact only where it exceeds this scatter too. For that test the scatter replaces the
-//! noise.
+//! Smallest detectable force, from the signal-to-noise ratio by the rule of [`crate::status`]; the scatter of
+//! untouched rows is a second noise.
 
 use crate::status::{Detection, FalseAlarmRate};
 use crate::untouched_scatter::UntouchedScatter;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_numerics::{bisect, percentile};
 
-/// The smallest detectable force on a surface, position by position, for contacts of unknown force.
+/// Smallest detectable force by position.
 ///
 /// ```
 /// use palpate_estimators::{influence::Influence, setup::Setup};
@@ -28,19 +25,14 @@ use palpate_numerics::{bisect, percentile};
 /// ```
 pub struct LightestTouch<'a> {
     rate: FalseAlarmRate,
-    /// Channels in use, each with the standard deviation of its noise.
     noise_sds: Vec<(usize, f64)>,
-    /// Change of each of them by a contact, over this standard deviation.
+    /// Standardized change by a contact.
     change: Box<dyn Fn(Contact) -> Vec<f64> + 'a>,
-    /// Detection rules; a detected contact passes all of them.
     rules: Vec<Rule>,
 }
 
-/// Detection rule: a contact is detected where the length of its weighted change is large enough.
 struct Rule {
-    /// Lengths that are detected with the probabilities [`LightestTouch::FOUND`].
     needed: [f64; 2],
-    /// Weight of each channel.
     weights: Vec<f64>,
 }
 
@@ -54,23 +46,22 @@ impl Rule {
     }
 }
 
-/// The smallest detectable force over a surface, for one detection probability.
+/// Smallest detectable forces at one probability.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TouchSummary {
     /// Detection probability.
     pub found: f64,
-    /// Median over the positions, in newtons.
+    /// Median over the positions.
     pub median_n: f64,
-    /// Position of the largest, and the largest in newtons.
+    /// Position and value of the maximum.
     pub worst: (Position, f64),
-    /// Number of positions at which no force is detected.
+    /// Number of positions without detection.
     pub without: usize,
 }
 
 impl<'a> LightestTouch<'a> {
     /// Detection probabilities.
     pub const FOUND: [f64; 2] = [0.5, 0.95];
-    /// Largest force that is considered, in newtons.
     const MOST_N: f64 = 1e6;
 
     pub(crate) fn new(
@@ -83,7 +74,7 @@ impl<'a> LightestTouch<'a> {
         Self { rate, noise_sds, change, rules }
     }
 
-    /// Adds the detection rule of a locator with the scatter of untouched rows. Channels without a scatter have weight 0.
+    /// Adds the test against the scatter of untouched rows.
     #[must_use]
     pub fn beyond(mut self, scatter: &UntouchedScatter) -> Self {
         let weight = |(channel, noise_sd): &(usize, f64)| match scatter.sd.get(*channel) {
@@ -99,12 +90,12 @@ impl<'a> LightestTouch<'a> {
         self
     }
 
-    /// The false-alarm rate of the detection.
+    /// False-alarm rate.
     pub fn rate(&self) -> FalseAlarmRate {
         self.rate
     }
 
-    /// The forces, in newtons, that are detected with the probabilities [`LightestTouch::FOUND`] at a position; `None` where no force is.
+    /// Returns the forces detected with [`LightestTouch::FOUND`].
     pub fn forces_at(&self, position: Position) -> [Option<f64>; 2] {
         [0, 1].map(|i| {
             let forces = self.rules.iter().map(|rule| self.force_n(position, rule, rule.needed[i]));
@@ -112,14 +103,13 @@ impl<'a> LightestTouch<'a> {
         })
     }
 
-    /// The force at which the weighted change has the length `needed`.
     fn force_n(&self, position: Position, rule: &Rule, needed: f64) -> Option<f64> {
         let signal = |force_n: f64| rule.length(&(self.change)(Contact { position, force_n }));
         let guess_n = needed / signal(1.0);
         if guess_n <= Self::MOST_N && (signal(guess_n) / needed - 1.0).abs() < 1e-9 {
             return Some(guess_n);
         }
-        // Readings that are not proportional to the force, or that saturate.
+        // Readings that saturate or are not proportional to the force.
         let enough = |force_n: &f64| signal(*force_n) >= needed;
         let high_n = std::iter::successors(Some(1e-9), |force_n| Some(2.0 * force_n))
             .take_while(|force_n| *force_n <= Self::MOST_N)
@@ -127,7 +117,7 @@ impl<'a> LightestTouch<'a> {
         Some(bisect((0.0, high_n), 50, |force_n| !enough(&force_n)))
     }
 
-    /// The smallest detectable force over some positions, for each of the probabilities; `None` where no position has one.
+    /// Summarizes positions for each probability.
     pub fn summaries(&self, positions: &[Position]) -> [Option<TouchSummary>; 2] {
         let forces: Vec<[Option<f64>; 2]> = positions.iter().map(|at| self.forces_at(*at)).collect();
         [0, 1].map(|i| {

@@ -1,4 +1,4 @@
-//! Likelihood of a reading given contacts, which a filter over time needs from a locator.
+//! Likelihood of a reading, for filters over time.
 
 use crate::force_prior::ForceRange;
 use crate::interval_check::IntervalCheck;
@@ -9,16 +9,15 @@ use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
 use std::f64::consts::SQRT_2;
 
-/// Variance of a contact that remains from calibration, and that further readings do not reduce.
+/// Variance from calibration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CalibrationVariance {
-    /// Covariance of the position, xx, xy and yy in m²; on a line xx alone.
+    /// Position covariance xx, xy, yy; on a line xx.
     pub position_m2: [f64; 3],
-    /// Variance of the force in N², where it is not known.
+    /// Variance of an unknown force.
     pub force_n2: f64,
 }
 
-/// Scatter and drift of the untouched surface of a calibration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct UntouchedSurface {
     pub scatter: Option<UntouchedScatter>,
@@ -26,15 +25,13 @@ pub(crate) struct UntouchedSurface {
 }
 
 impl UntouchedSurface {
-    /// The untouched surface for a filter that itself tracks the drift. Where the random walk makes up most of the scatter, in units of the
-    /// noise over all channels, the noise of two readings replaces the scatter. The walk of a single channel is too uncertain to be
-    /// subtracted.
+    /// Where a tracked walk dominates the scatter, the noise of two readings replaces it; walks of single
+    /// channels are too uncertain to subtract.
     pub fn beside_walk(
         scatter: Option<UntouchedScatter>,
         drift: Option<UntouchedDrift>,
         noise_sd: &[Option<f64>],
     ) -> Self {
-        /// Share of the scatter that counts as most of it.
         const MOST: f64 = 0.5;
         let walks = drift.as_ref().map(UntouchedDrift::walk_variances).unwrap_or_default();
         let scatter = scatter.map(|mut scatter| {
@@ -53,117 +50,113 @@ impl UntouchedSurface {
         Self { scatter, drift }
     }
 
-    /// True for a reading within the scatter.
     pub fn contains(&self, reading: &[f64]) -> bool {
         self.scatter.as_ref().is_some_and(|scatter| scatter.contains(reading))
     }
 }
 
-/// A fitted method that gives the likelihood of contacts for a reading.
+/// Fitted method with a likelihood of contacts.
 pub trait Likelihood: Send + Sync {
-    /// The fits of contacts on this surface.
+    /// Fits of contacts.
     fn geometry(&self) -> Geometry<'_>;
 
-    /// Whitens a reading for the fits, and writes it over `whitened`.
+    /// Whitens a reading into `whitened`.
     fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>);
 
-    /// Fit of the surface alone to a reading that [`Likelihood::whiten`] prepared, at u = `mode_n`; the unknown is u
-    /// (see [`LineLikelihood`]), which a plane does not have.
+    /// Fits the surface without contacts at u = `mode_n` (see [`LineLikelihood`]).
     fn fit_nothing(&self, whitened: &[f64], mode_n: f64) -> ContactFit<1>;
 
-    /// Signal-to-noise ratio of a contact in balance: the sum of (W·f)² over the noise's variance, of all channels.
+    /// Returns Σ (W·f)²/σ² of a contact in balance.
     fn signal(&self, contact: Contact) -> f64;
 
-    /// Variance of each contact that calibration leaves.
+    /// Returns the variance of each contact from calibration.
     fn calibration_variance(&self, contacts: &[Contact]) -> [CalibrationVariance; 2];
 
-    /// Whitened reading of contacts in balance, with its derivatives and the variance that calibration leaves.
+    /// Linearizes the whitened reading in balance.
     fn linearised(&self, contacts: &[Contact]) -> Linearisation;
 
-    /// Estimate from one reading alone, without those before it: the best contacts, and the other modes.
+    /// Estimates contacts from one reading.
     fn single_estimate(&self, reading: &[f64]) -> Estimate;
 
-    /// True for a reading within the residue that touches leave on an untouched surface.
+    /// True within the residue of touches.
     fn is_residue(&self, reading: &[f64]) -> bool;
 
-    /// Check of the locator's 95 % intervals, which widens those of tracks.
+    /// Interval check.
     fn interval_check(&self) -> Option<&IntervalCheck>;
 
-    /// Drift of the channels that the untouched rows of the calibration show.
+    /// Drift of untouched rows.
     fn untouched_drift(&self) -> Option<&UntouchedDrift>;
 
     /// Extent of the surface.
     fn extent(&self) -> Extent;
 
-    /// The force of every contact in newtons, where it is known exactly.
+    /// Known force of contacts.
     fn known_force_n(&self) -> Option<f64>;
 
-    /// Range of the forces of contacts where they are not known; `None` where they are.
+    /// Range of unknown forces.
     fn force_range(&self) -> Option<ForceRange>;
 
-    /// The most contacts that may touch at once.
+    /// Limit of simultaneous contacts.
     fn most_contacts(&self) -> usize;
 }
 
-/// Whitened reading of contacts in balance, expanded about their places and forces.
+/// Linearized whitened reading of contacts in balance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Linearisation {
     /// Σ W·f of each channel.
     pub reading: Vec<f64>,
-    /// Derivatives of that by x, y and W of each contact in turn; zeros by y on a line, and by a force that is known.
+    /// Derivatives by x, y and W of each contact; 0 for fixed ones.
     pub derivatives: Vec<Vec<f64>>,
     /// Variance of each channel from calibration.
     pub variance: Vec<f64>,
 }
 
-/// Geometry of the contacts, on a line or on a plane, with the fits that go with that.
+/// Fits by the geometry of contacts.
 #[derive(Clone, Copy)]
 pub enum Geometry<'a> {
-    /// Contacts have one coordinate.
+    /// One coordinate.
     Line(&'a dyn LineLikelihood),
-    /// Contacts have two.
+    /// Two coordinates.
     Plane(&'a dyn PlaneLikelihood),
 }
 
 /// Likelihood of contacts on a line.
 ///
-/// A vibrating surface is bent by the force u = m·ω²·q of its first mode. A surface in balance is bent by the contacts' share Σ W·φ(x)
-/// instead, with φ the shape of the mode. So the vibrating surface reads Σ W·f(x) + (u − Σ W·φ(x))·g, with g the reading of the sensors per
-/// newton of u. The faster modes are assumed to be in balance.
+/// A vibrating surface is bent by u = m·ω²·q of its first mode, of shape φ, in place of Σ W·φ(x). It reads Σ
+/// W·f(x) + (u − Σ W·φ(x))·g, with g per newton of u and higher modes in balance.
 pub trait LineLikelihood {
-    /// Fit of one contact; the unknowns are u, place and force. Without `mode_n` the surface is in balance.
+    /// Fits u, position and force; in balance without `mode_n`.
     fn fit_one(&self, whitened: &[f64], contact: Contact, mode_n: Option<f64>) -> ContactFit<3>;
 
-    /// Fit of two contacts; the unknowns are u, place and force of the first, place and force of the second.
+    /// Fits u, positions and forces of two contacts.
     fn fit_two(&self, whitened: &[f64], contacts: [Contact; 2], mode_n: Option<f64>) -> ContactFit<5>;
 
-    /// The first mode's shape φ at a place, and its slope per metre.
+    /// Returns the first mode φ and its slope.
     fn first_mode(&self, x_m: f64) -> [f64; 2];
 }
 
-/// Likelihood of a contact on a plane in balance.
+/// Likelihood of a contact on a plane.
 pub trait PlaneLikelihood {
-    /// The unknowns are x, y and force.
+    /// Fits x, y and force.
     fn fit_on_plane(&self, whitened: &[f64], contact: Contact) -> ContactFit<3>;
 }
 
-/// The χ² of K unknowns and its second-order expansion about them, by Gauss and Newton: moved by δ it is about χ² − 2·gᵀδ + δᵀ·A·δ. The
-/// log-likelihood is −χ²/2, up to a constant.
+/// χ² of K unknowns, about χ² − 2·gᵀδ + δᵀ·A·δ (Gauss–Newton); −χ²/2 is the log-likelihood.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactFit<const K: usize> {
     /// χ².
     pub misfit: f64,
-    /// g, per unit of each unknown.
+    /// g.
     pub score: [f64; K],
-    /// A: the Fisher information of each pair of unknowns.
+    /// Fisher information A.
     pub information: [[f64; K]; K],
 }
 
 impl<const K: usize> ContactFit<K> {
-    /// The fit to no data.
+    /// Fit to no data.
     pub const NOTHING: Self = Self { misfit: 0.0, score: [0.0; K], information: [[0.0; K]; K] };
 
-    /// Adds a residual with its derivatives, the sign changed, and its weight; `information` only on and above its diagonal.
+    /// Adds a weighted residual and its negative derivatives, to the upper triangle.
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "as the formula has its indices")]
     pub fn add(&mut self, residual: f64, derivatives: &[f64; K], weight: f64) {
@@ -177,7 +170,7 @@ impl<const K: usize> ContactFit<K> {
         }
     }
 
-    /// Copies the upper triangle of the information to the lower one.
+    /// Copies the upper triangle to the lower.
     #[must_use]
     pub fn mirrored(mut self) -> Self {
         for i in 0..K {

@@ -1,52 +1,52 @@
-//! Faults of a locator's numbers, as a file may have them.
+//! Faults of numbers in locator files.
 
 use std::borrow::Borrow;
 
-/// A locator with inconsistent numbers.
+/// Inconsistent numbers of a locator.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LocatorFault {
-    /// A list has the wrong length.
+    /// List of the wrong length.
     #[error("the locator has {found} {what}; it must have {needed}")]
     Count {
-        /// Name of the list's elements.
+        /// Name of the elements.
         what: &'static str,
-        /// Length that the rest of the locator requires.
+        /// Required length.
         needed: usize,
         /// Length of the list.
         found: usize,
     },
-    /// A number that is infinite, not a number, or beyond its bound.
+    /// Number out of range.
     #[error("the locator's {what} number {number} is {value:?}; it must be {bound}")]
     BadNumber {
-        /// Name of the list's elements.
+        /// Name of the elements.
         what: &'static str,
-        /// Which one, from 1.
+        /// Index from 1.
         number: usize,
-        /// The number.
+        /// Value.
         value: f64,
-        /// Bound of the number, in words.
+        /// Bound in words.
         bound: &'static str,
     },
-    /// A divisor that is hardly more than 0.
+    /// Divisor close to 0.
     #[error(
         "the locator's {what} number {number} is {value:?}; it must be at least {:e}",
         LocatorFault::LEAST
     )]
     TooSmall {
-        /// Name of the list's elements.
+        /// Name of the elements.
         what: &'static str,
-        /// Which one, from 1.
+        /// Index from 1.
         number: usize,
-        /// The number.
+        /// Value.
         value: f64,
     },
 }
 
 impl LocatorFault {
-    /// Least size of a number that must not be 0: its inverse and the square of that are numbers.
+    /// Least divisor, with a finite squared inverse.
     pub const LEAST: f64 = 1e-60;
 
-    /// The number that is at fault, or the count that was found.
+    /// Faulty number, or the count.
     pub fn value(&self) -> f64 {
         match self {
             Self::Count { found, .. } => *found as f64,
@@ -57,7 +57,7 @@ impl LocatorFault {
     /// Checks the length of a list.
     ///
     /// # Errors
-    /// [`LocatorFault::Count`] when `found` is not `needed`.
+    /// [`LocatorFault::Count`].
     pub fn check_count(what: &'static str, needed: usize, found: usize) -> Result<(), Self> {
         if needed == found { Ok(()) } else { Err(Self::Count { what, needed, found }) }
     }
@@ -65,8 +65,7 @@ impl LocatorFault {
     /// Checks the numbers of a list.
     ///
     /// # Errors
-    /// [`LocatorFault::BadNumber`] for the first number that is not finite or not `good`, and [`LocatorFault::TooSmall`] for a number
-    /// hardly more than 0 where 0 is not good.
+    /// [`LocatorFault::BadNumber`] unless finite and `good`; [`LocatorFault::TooSmall`] near a forbidden 0.
     pub fn check_numbers(
         what: &'static str,
         numbers: impl IntoIterator<Item = impl Borrow<f64>>,

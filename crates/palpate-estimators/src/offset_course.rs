@@ -1,18 +1,18 @@
-//! Offsets of the channels in the course of a recording, by which its readings are tared.
+//! Offsets over a recording, for tares.
 
 use crate::recording::Recording;
 
-/// Offsets of the channels at the rows of a recording, estimated from the presses of another recording.
+/// Offsets by row, estimated from another recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OffsetCourse {
-    /// Offset of each channel at each row; `None` for a channel that is not in use.
+    /// Offset of each used channel by row.
     pub at_rows: Vec<Option<Vec<f64>>>,
-    /// Mean offset of each channel over the recording from which the offsets are estimated.
+    /// Mean offset over the other recording.
     pub means: Vec<Option<f64>>,
 }
 
 impl OffsetCourse {
-    /// The rows with the offsets `learnt` in place of their own, or with the means where no offset was learnt.
+    /// Returns rows with the offsets `learnt`, or else the means.
     pub fn tared(&self, recording: &Recording, learnt: Option<&[f64]>) -> Recording {
         let mut tared = recording.clone();
         for (i, row) in tared.rows.iter_mut().enumerate() {
@@ -27,7 +27,7 @@ impl OffsetCourse {
         tared
     }
 
-    /// Greatest change of each channel over the rows, in its unit.
+    /// Range of each channel's offsets.
     pub fn spans(&self) -> Vec<f64> {
         let span = |offsets: &Option<Vec<f64>>| {
             let offsets = offsets.iter().flatten();

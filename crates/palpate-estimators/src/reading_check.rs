@@ -1,16 +1,12 @@
-//! A check of learnt locators by a forward model, which gives the readings of contacts. It is learnt from the same recording as the locator.
+//! Check of learnt locators by a forward model.
 //!
-//! Networks, Gaussian processes, neighbours and the centroid map a reading to a position, and give one for any reading. They do not model
-//! the reading of a contact. Influence functions do, and for a bending finger its equations. By the rule of [`crate::status`] they decide
-//! whether noise explains a reading, or no contact does. They also give the interval of the contact that explains it. In an estimate with a
-//! check
+//! Learnt methods give a position for any reading. Influence functions, or a digit's equations, decide by the
+//! rule of [`crate::status`] whether a contact explains it.
 //!
-//! - the check determines `no_contact`, `outside_model` and `ambiguous`, with the other places;
-//! - the position remains. One beyond an edge of the surface moves to that edge where a contact on the surface explains the reading;
-//! - the 95 % interval is the smallest that contains the check's interval and the position. A learnt method estimates its errors for
-//!   contacts like those of its presses. The forward model better describes how errors change with force and place.
-//! - Where influence functions do not explain the readings well, a method with errors at held-out positions has the shorter intervals.
-//!   These are kept for contacts like its presses, that is, with forces in the pressed range.
+//! - The check determines statuses and further modes.
+//! - The position remains, within the surface for explained readings.
+//! - The 95 % interval contains the check's interval and the position.
+//! - Where influence functions explain poorly, shorter cross-validated intervals are kept for pressed forces.
 
 use serde::{Deserialize, Serialize};
 
@@ -27,7 +23,7 @@ use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_numerics::watch::Cancelled;
 use std::borrow::Cow;
 
-/// A check of the estimates of a learnt method; see [the module](self).
+/// Check of estimates; see [the module](self).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(into = "CheckData", try_from = "CheckData")]
 pub struct ReadingCheck {
@@ -35,25 +31,21 @@ pub struct ReadingCheck {
     own_intervals: Option<OwnIntervals>,
 }
 
-/// Forward model, from a contact to its reading: influence functions, or the equations of a bending finger.
 #[derive(Clone, Debug, PartialEq)]
 enum Forward {
     Influence(InfluenceLocator),
     Digit(DigitLocator),
 }
 
-/// Ratio of the mean length of the method's own intervals to that of the widened ones, below which the own intervals are kept.
+/// Ratio of mean lengths for own intervals.
 const OWN_SHARE: f64 = 0.9;
 
-/// Span of forces at which the method's own intervals are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct OwnIntervals {
-    /// Least and greatest force of the presses, in newtons, where they were recorded.
     force_n: Option<(f64, f64)>,
 }
 
-/// A check in a file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CheckData {
@@ -89,13 +81,13 @@ impl TryFrom<CheckData> for ReadingCheck {
 }
 
 impl ReadingCheck {
-    /// The most rows that influence functions are learnt from. More rows would not improve the check enough to change a status.
+    /// Limit of rows; more do not change a status.
     pub const MOST_ROWS: usize = 500;
 
-    /// The check by a recording; `None` where influence functions cannot be learnt from it.
+    /// Fits the check; `None` where influence functions fail.
     ///
     /// # Errors
-    /// [`Cancelled`] when the watch stopped it.
+    /// [`Cancelled`].
     pub fn fit(task: FitTask) -> Result<Option<Self>, Cancelled> {
         let recording = Self::thinned(task.recording);
         let task = FitTask { recording: &recording, ..task };
@@ -118,13 +110,8 @@ impl ReadingCheck {
         Ok(None)
     }
 
-    /// Keeps a method's own intervals where, at the presses of a recording, they are in the mean more than a tenth shorter than the
-    /// intervals that the check widens. A smaller gain is not worth it, since the check's intervals adapt to forces that were not pressed.
-    ///
-    /// For a known force they are never kept, since no test detects that a contact has another force.
-    ///
-    /// # Errors
-    /// [`Cancelled`] when the watch stopped it.
+    /// Keeps own intervals shorter by more than a tenth, except for a known force: no test detects another,
+    /// and the check adapts better.
     pub(crate) fn keeping_intervals(
         mut self,
         task: FitTask,
@@ -151,7 +138,6 @@ impl ReadingCheck {
         Ok(self)
     }
 
-    /// The rows that a check is learnt from: [`ReadingCheck::MOST_ROWS`] at most, picked evenly.
     pub(crate) fn thinned(recording: &Recording) -> Cow<'_, Recording> {
         let rows = recording.rows.len();
         if rows <= Self::MOST_ROWS {
@@ -161,7 +147,7 @@ impl ReadingCheck {
         Cow::Owned(recording.subset(&picked))
     }
 
-    /// Share of untouched readings that may be mistaken for a contact; `None` for a check that does not detect untouched readings.
+    /// False-alarm rate; `None` for a check without detection.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         match &self.by {
             Forward::Influence(influence) => influence.false_alarm_rate(),
@@ -169,7 +155,7 @@ impl ReadingCheck {
         }
     }
 
-    /// Offset of each channel, in its SI unit; `None` where the check does not learn it.
+    /// Learnt offsets in SI units.
     pub fn offsets(&self) -> Option<Vec<f64>> {
         match &self.by {
             Forward::Influence(influence) => influence.offsets(),
@@ -177,12 +163,12 @@ impl ReadingCheck {
         }
     }
 
-    /// True where the method's own intervals are kept at contacts like its presses.
+    /// True where own intervals are kept.
     pub fn keeps_intervals(&self) -> bool {
         self.own_intervals.is_some()
     }
 
-    /// Name of the forward model, in words.
+    /// Name of the forward model.
     pub fn in_words(&self) -> &'static str {
         match &self.by {
             Forward::Influence(_) => "influence functions of the same recording",
@@ -231,7 +217,6 @@ impl CheckEstimate for ReadingCheck {
 }
 
 impl ReadingCheck {
-    /// The estimate of a learnt method after the check by `explained`, the estimate of the forward model.
     fn left_by(&self, explained: Estimate, estimate: Estimate, extent: Extent) -> Estimate {
         let is_like_presses = self.own_intervals.is_some_and(|OwnIntervals { force_n }| {
             let told = force_n.zip(explained.contact.force_n);
@@ -259,7 +244,7 @@ impl ReadingCheck {
     }
 }
 
-/// Length of the 95 % interval on a surface, the sum of both intervals on a plane; infinite for an estimate without one.
+/// Summed over coordinates; infinite without an interval.
 fn interval_m(estimate: &Estimate, extent: Extent) -> f64 {
     let Some(told) = estimate.contact.uncertainty else { return f64::INFINITY };
     let length_m = |(low, high): (f64, f64), side_m: f64| high.min(side_m) - low.max(0.0);
@@ -267,13 +252,11 @@ fn interval_m(estimate: &Estimate, extent: Extent) -> f64 {
     length_m(told.x_95_m, extent.length_m()) + y_m
 }
 
-/// The point of a surface that is nearest to a position.
 fn nearest_on(extent: Extent, Position { x_m, y_m }: Position) -> Position {
     let held = |at_m: f64, size_m: f64| at_m.max(0.0).min(size_m);
     Position { x_m: held(x_m, extent.length_m()), y_m: held(y_m, extent.width_m().unwrap_or(0.0)) }
 }
 
-/// The uncertainty of the contact that explains the reading, widened so that it contains the estimate.
 fn uncertainty_with(estimate: &ContactEstimate, explained: &ContactEstimate) -> Option<Uncertainty> {
     let Some(other) = explained.uncertainty else { return estimate.uncertainty };
     let (at, there) = (estimate.position, explained.position);

@@ -1,4 +1,4 @@
-//! Setups: surface, sensors, known force, and the columns of recordings.
+//! Setups.
 
 use std::io::Read;
 
@@ -18,8 +18,7 @@ use palpate_mechanics::units::Quantity;
 use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Watch;
 
-/// A surface with its sensors, which all lie on it, and the contact force or its bound, where known. A rig describes a setup, and a locator
-/// contains it.
+/// Surface with sensors, and the known contact force or bound.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Unchecked")]
 pub struct Setup {
@@ -35,7 +34,6 @@ pub struct Setup {
     imperfections: Option<Imperfections>,
 }
 
-/// A setup in a file, not yet checked.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename = "Setup")]
 struct Unchecked {
@@ -66,81 +64,77 @@ impl TryFrom<Unchecked> for Setup {
     }
 }
 
-/// A sensor, or a force, that does not go with its surface.
+/// Unsuitable sensor or force.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SetupError {
-    /// A sensor beside the surface.
+    /// Sensor off the surface.
     #[error(transparent)]
     OffSurface(#[from] OffSurface),
-    /// A reaction sensor at a place without a support.
+    /// Reaction sensor without a support.
     #[error("reaction sensor {number} is at {}, where no support takes up force", extent.place_in_words(*position))]
     NoSupport {
-        /// Which sensor of its group, from 1.
+        /// Index in its group, from 1.
         number: usize,
         /// Position.
         position: Position,
-        /// The surface.
+        /// Surface.
         extent: Extent,
     },
-    /// A sensor that is insensitive to contacts anywhere on the surface.
+    /// Sensor that is insensitive to all contacts.
     #[error(
         "{kind} sensor {number} is at {} and would always read 0: {reason}",
         extent.place_in_words(*position)
     )]
     Insensitive {
-        /// Which sensor of its group, from 1.
+        /// Index in its group, from 1.
         number: usize,
-        /// Quantity that it measures.
+        /// Quantity.
         kind: SensorKind,
         /// Position.
         position: Position,
-        /// The surface.
+        /// Surface.
         extent: Extent,
-        /// Reason for which the sensor is insensitive.
+        /// Reason.
         reason: InsensitiveSensor,
     },
-    /// A sensor on a digit that is not a strain gauge.
+    /// Digit sensor other than a strain gauge.
     #[error("a digit is read by strain gauges, not by {kind} sensors")]
     NotAGauge {
-        /// Quantity that it measures.
+        /// Quantity.
         kind: SensorKind,
     },
-    /// A raw channel on a surface with a model.
+    /// Raw channel on a surface with a model.
     #[error("a raw channel has no model; only a measured surface has raw channels")]
     RawOnModel,
-    /// A grid of sensors on a line.
+    /// Grid of sensors on a line.
     #[error("a grid of sensors needs a plane; this surface is a line")]
     GridOnLine,
-    /// Evenly spaced sensors on a plane, where a number alone does not define their positions.
+    /// Evenly spaced sensors on a plane.
     #[error("{count} sensors along a length do not define positions on a plane; place them by a grid")]
     EvenlyOnPlane {
         /// Number of sensors.
         count: usize,
     },
-    /// A group without sensors.
+    /// Group without sensors.
     #[error("a group of 0 sensors; at least 1 is needed")]
     NoSensors,
-    /// Noise in a unit in which no sensor measures.
+    /// Noise in a unit of no sensor.
     #[error("noise of {noise}: no sensor measures in this unit")]
     NoSensorOfUnit {
-        /// The noise.
+        /// Noise.
         noise: Quantity,
     },
-    /// A soft layer on a digit.
+    /// Soft layer on a digit.
     #[error("a soft layer spreads a touch over several points; a digit bends too far for readings to add up")]
     SoftLayerOnDigit,
-    /// An invalid layout.
+    /// Invalid layout.
     #[error(transparent)]
     Layout(#[from] LayoutError),
-    /// A number that is not in its range.
+    /// Number out of range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
 }
 
-/// Checks that a sensor of this `kind` at `position` goes with a surface; `number` is its number in messages, from 1.
-///
-/// # Errors
-/// [`SetupError`] off the surface, where the sensor is insensitive, or for a kind that does not suit the surface.
 fn check_sensor(
     surface: &SurfaceSpec,
     kind: SensorKind,
@@ -168,7 +162,7 @@ fn check_sensor(
 }
 
 impl Setup {
-    /// A surface without sensors yet, touched by contacts of unknown force.
+    /// Returns a surface without sensors.
     ///
     /// ```
     /// use palpate_estimators::setup::Setup;
@@ -193,7 +187,7 @@ impl Setup {
         }
     }
 
-    /// A surface without a model, `length_m` metres long, with these raw channels, known by recordings only.
+    /// Returns a line without a model, with raw channels.
     ///
     /// ```
     /// use palpate_estimators::recording::Columns;
@@ -209,15 +203,15 @@ impl Setup {
     /// ```
     ///
     /// # Errors
-    /// [`SetupError`] without channels, or for a length that is not greater than 0 and finite.
+    /// [`SetupError`] without channels or length.
     pub fn measured(length_m: f64, channels: &[&str]) -> Result<Self, SetupError> {
         Self::of_extent(Extent::line(length_m)?, channels)
     }
 
-    /// A plane without a model, known by recordings only; see [`Setup::measured`].
+    /// Returns a plane without a model; see [`Setup::measured`].
     ///
     /// # Errors
-    /// [`SetupError`] without channels, or for a length or width that is not greater than 0 and finite.
+    /// [`SetupError`] without channels, length or width.
     pub fn measured_plane(length_m: f64, width_m: f64, channels: &[&str]) -> Result<Self, SetupError> {
         Self::of_extent(Extent::plane(length_m, width_m)?, channels)
     }
@@ -231,40 +225,40 @@ impl Setup {
         Ok(setup)
     }
 
-    /// The surface that is touched.
+    /// Surface.
     pub fn surface(&self) -> &SurfaceSpec {
         &self.surface
     }
 
-    /// Sensors, one a channel of a reading.
+    /// Sensors, one per channel.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
 
-    /// The contact force in newtons, greater than 0, where it is known.
+    /// Known force of contacts.
     pub fn force_n(&self) -> Option<f64> {
         self.force_n
     }
 
-    /// The greatest force of contacts of unknown force in newtons, greater than 0, where it is stated, by itself or as the end of a range.
+    /// Stated upper bound of an unknown force.
     pub fn greatest_force_n(&self) -> Option<f64> {
         self.force_range.map(|range| range.ends_n().1).or(self.greatest_force_n)
     }
 
-    /// Range of the forces of contacts of unknown force, where it is stated.
+    /// Stated range of an unknown force.
     pub fn force_range(&self) -> Option<ForceRange> {
         self.force_range
     }
 
-    /// Roles of a recording's columns; `None` for the columns that palpate itself writes.
+    /// Column roles; `None` for palpate's own columns.
     pub fn columns(&self) -> Option<&Columns> {
         self.columns.as_ref()
     }
 
-    /// Adds sensors. Each kind is numbered separately: "deflection_1", "strain_1".
+    /// Adds sensors, numbered by kind: "deflection_1", "strain_1".
     ///
     /// # Errors
-    /// [`SetupError`] for a sensor that does not suit the surface, or numbers of its channel out of their range.
+    /// [`SetupError`] for an unsuitable sensor.
     pub fn sensors(mut self, group: SensorGroup) -> Result<Self, SetupError> {
         let SensorGroup { kind, placement, channel } = group;
         channel.check()?;
@@ -280,19 +274,19 @@ impl Setup {
         Ok(self)
     }
 
-    /// Replaces the sensors. It accepts sensors that are insensitive at their positions.
+    /// Replaces the sensors, including insensitive ones.
     ///
     /// # Errors
-    /// [`OffSurface`] for the first sensor beside the surface.
+    /// [`OffSurface`].
     pub fn with_layout(self, layout: Layout) -> Result<Self, OffSurface> {
         self.check_places(&layout)?;
         Ok(Self { layout, ..self })
     }
 
-    /// Changes the sensors. The setup stays as it was where the changed sensors are refused.
+    /// Changes the sensors, unless refused.
     ///
     /// # Errors
-    /// [`SetupError`] for a sensor beside the surface, or with a number out of its range.
+    /// [`SetupError`] for an unsuitable sensor.
     pub fn edit_sensors(&mut self, edit: impl FnOnce(&mut Vec<Sensor>)) -> Result<(), SetupError> {
         let mut layout = self.layout.clone();
         layout.edit(edit)?;
@@ -301,7 +295,7 @@ impl Setup {
         Ok(())
     }
 
-    /// Sets the standard deviation of the noise of every sensor that measures in the unit of `noise`.
+    /// Sets the noise of sensors with the unit of `noise`.
     ///
     /// ```
     /// use palpate_estimators::setup::Setup;
@@ -315,7 +309,7 @@ impl Setup {
     /// ```
     ///
     /// # Errors
-    /// [`SetupError`] where no sensor measures in this unit, and for a standard deviation less than 0.
+    /// [`SetupError`] without such a sensor, or below 0.
     pub fn with_noise(mut self, noise: Quantity) -> Result<Self, SetupError> {
         let meant = |sensor: &Sensor| sensor.kind.dimension() == noise.dimension;
         if !self.layout.sensors().iter().any(meant) {
@@ -333,48 +327,48 @@ impl Setup {
         OffSurface::check("sensor", &positions, self.surface.extent())
     }
 
-    /// Disables or enables a channel, by its index from 0; see [`Layout::set_dead`].
+    /// Disables or enables a channel; see [`Layout::set_dead`].
     pub fn set_dead(&mut self, channel: usize, dead: bool) {
         self.layout.set_dead(channel, dead);
     }
 
-    /// Sets the known force of contacts, in newtons.
+    /// Sets the known force.
     ///
     /// # Errors
-    /// [`SetupError::OutOfRange`] for a force that is not greater than 0 and finite.
+    /// [`SetupError::OutOfRange`] unless positive and finite.
     pub fn known_force(self, force_n: f64) -> Result<Self, SetupError> {
         Ok(self.with_force(Some(force_n))?)
     }
 
-    /// Makes the force of contacts unknown.
+    /// Makes the force unknown.
     #[must_use]
     pub fn unknown_force(self) -> Self {
         Self { force_n: None, ..self }
     }
 
-    /// Sets the force of contacts in newtons; `None` for an unknown force.
+    /// Sets the force; `None` for unknown.
     ///
     /// # Errors
-    /// [`OutOfRange`] for a force that is not greater than 0 and finite.
+    /// [`OutOfRange`] unless positive and finite.
     pub fn with_force(self, force_n: Option<f64>) -> Result<Self, OutOfRange> {
         OutOfRange::check_positive(force_n.map(|force_n| ("the force in newtons", force_n)))?;
         Ok(Self { force_n, ..self })
     }
 
-    /// Sets the greatest force of contacts of unknown force, in newtons; `None` to derive it from the calibration.
+    /// Sets the upper bound of an unknown force; `None` for the calibration's.
     ///
     /// # Errors
-    /// [`OutOfRange`] for a force that is not greater than 0 and finite.
+    /// [`OutOfRange`] unless positive and finite.
     pub fn with_greatest_force(self, greatest_force_n: Option<f64>) -> Result<Self, OutOfRange> {
         let named = greatest_force_n.map(|force_n| ("the greatest force in newtons", force_n));
         OutOfRange::check_positive(named)?;
         Ok(Self { greatest_force_n, ..self })
     }
 
-    /// Sets the imperfections of simulations. Estimators do not use them.
+    /// Sets the imperfections of simulations.
     ///
     /// # Errors
-    /// [`SetupError`] for a number out of its range, and for a soft layer on a digit.
+    /// [`SetupError`] for a number out of range or a digit's soft layer.
     pub fn with_imperfections(self, imperfections: Imperfections) -> Result<Self, SetupError> {
         imperfections.check(self.surface.extent())?;
         if imperfections.touch_width_m > 0.0 && matches!(self.surface, SurfaceSpec::Digit(_)) {
@@ -383,24 +377,24 @@ impl Setup {
         Ok(Self { imperfections: Some(imperfections), ..self })
     }
 
-    /// Removes the imperfections: simulations have the faults of the channels alone, and no course in time.
+    /// Removes the imperfections.
     #[must_use]
     pub fn without_imperfections(self) -> Self {
         Self { imperfections: None, ..self }
     }
 
-    /// Imperfections of simulations; `None` where these have the faults of the channels alone.
+    /// Imperfections of simulations.
     pub fn imperfections(&self) -> Option<&Imperfections> {
         self.imperfections.as_ref()
     }
 
-    /// Sets the range of the forces of contacts of unknown force; `None` to derive it from the calibration.
+    /// Sets the range of an unknown force; `None` for the calibration's.
     #[must_use]
     pub fn with_force_range(self, force_range: Option<ForceRange>) -> Self {
         Self { force_range, ..self }
     }
 
-    /// Knowledge of the contact force.
+    /// Force or its bounds.
     pub fn force(&self) -> Force {
         if self.force_n.is_some() { Force::Known } else { Force::Unknown }
     }
@@ -411,24 +405,24 @@ impl Setup {
         Self { columns: Some(columns), ..self }
     }
 
-    /// The Cramér–Rao bound of this bench.
+    /// Cramér–Rao bound.
     ///
     /// # Errors
-    /// [`LimitError`] for a measured surface, for an enabled sensor without noise, and where all sensors are disabled.
+    /// [`LimitError`] without a model, noise or enabled sensors.
     pub fn cramer_rao_bound(&self) -> Result<CramerRaoBound<'_>, LimitError> {
         self.cramer_rao_bound_watched(Watch::NONE)
     }
 
-    /// The Cramér–Rao bound of this bench, watched while sensors are solved for.
+    /// [`Setup::cramer_rao_bound`], watched.
     ///
     /// # Errors
-    /// The errors of [`Setup::cramer_rao_bound`], and [`LimitError::Cancelled`].
+    /// As there, and [`LimitError::Cancelled`].
     pub fn cramer_rao_bound_watched(&self, watch: Watch) -> Result<CramerRaoBound<'_>, LimitError> {
         let model = self.surface.model().ok_or(LimitError::NoModel)?;
         CramerRaoBound::new_watched(model, &self.layout, watch)
     }
 
-    /// Roles of a recording's columns: the named ones, or the columns that palpate itself writes.
+    /// Column roles, by default those of palpate.
     pub fn recording_columns(&self) -> Columns {
         match &self.columns {
             Some(columns) => columns.clone(),
@@ -436,18 +430,18 @@ impl Setup {
         }
     }
 
-    /// Reads a recording of this bench; see [`recording::read`]. The force of the bench is used where the file has none.
+    /// Reads a recording, by default with the setup's force; see [`recording::read`].
     ///
     /// # Errors
-    /// [`CsvError`], with line and column.
+    /// [`CsvError`].
     pub fn read_recording(&self, source: &str, bytes: impl Read) -> Result<Recording, CsvError> {
         recording::read(source, bytes, &self.schema(&self.recording_columns()))
     }
 
-    /// Reads a recording of this bench from two files; see [`recording::read_pair`].
+    /// Reads a recording from two files; see [`recording::read_pair`].
     ///
     /// # Errors
-    /// [`CsvError`], with line and column.
+    /// [`CsvError`].
     pub fn read_recording_pair(
         &self,
         readings: (&str, impl Read),
@@ -456,7 +450,7 @@ impl Setup {
         recording::read_pair(readings, contacts, &self.schema(&self.recording_columns()))
     }
 
-    /// Schema of a recording of this bench, by columns such as [`Setup::recording_columns`].
+    /// Returns the schema of a recording.
     pub fn schema<'a>(&'a self, columns: &'a Columns) -> Schema<'a> {
         let extent = self.surface.extent();
         Schema { columns, layout: &self.layout, extent, known_force_n: self.force_n }

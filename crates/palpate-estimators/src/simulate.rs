@@ -1,4 +1,4 @@
-//! Recordings simulated with the model of a surface.
+//! Recordings simulated by the model of a surface.
 
 mod bench;
 mod faulty_channels;
@@ -24,59 +24,57 @@ pub use bench::SimulatedBench;
 pub use moving::{MovingContact, MovingContacts, simulate_moving, simulate_moving_watched};
 pub(crate) use presses::{Press, PressedBench};
 
-/// A rig that cannot be simulated.
+/// Error of a simulation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SimulateError {
-    /// The surface has no model.
+    /// Surface without a model.
     #[error("a measured surface has no model to simulate; it needs a recording")]
     NoModel,
-    /// The contact force is not given.
+    /// Unknown contact force.
     #[error("a simulation needs the contact force; `force` in [contact] is missing")]
     NoForce,
-    /// The training positions cannot be laid out.
+    /// Invalid training positions.
     #[error(transparent)]
     Arrangement(#[from] ArrangementError),
-    /// A number of a sensor is not in its range.
+    /// Sensor number out of range.
     #[error(transparent)]
     Layout(#[from] LayoutError),
-    /// A force, or the speed of a moving contact, is not in its range.
+    /// Force or speed out of range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
-    /// The equations of the surface have no solution in balance.
+    /// Surface equations without a solution.
     #[error("the equations of the surface could not be solved: {error}; {help}", error = .0, help = .0.help())]
     Surface(#[from] Unsolvable),
-    /// A position does not lie on the surface.
+    /// Position off the surface.
     #[error(transparent)]
     OffSurface(#[from] OffSurface),
-    /// The zero of the readings needs untouched rows.
+    /// Zero without untouched rows.
     #[error("`zero = \"last\"` needs untouched rows, and only a bench with [imperfections] simulates them")]
     NoUntouchedRow(#[from] NoUntouchedRow),
-    /// The watch stopped the work.
+    /// Cancelled.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
 
-/// Stage of the work, for the watch.
 const STAGE: &str = "simulating";
-/// Readings between two checks of the watch.
 const READINGS_EACH: usize = 256;
 
-/// The sensors of a layout under a surface with a model, each with its response function.
+/// Response functions of sensors.
 pub struct CleanSensors<'a> {
     functions: Vec<Arc<dyn ResponseFunction + 'a>>,
 }
 
 impl<'a> CleanSensors<'a> {
-    /// The response functions of all sensors of `layout`.
+    /// Returns the response functions of a layout.
     pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Self {
         let function = |sensor: &Sensor| surface.response_function(sensor.kind, sensor.position);
         Self { functions: layout.sensors().iter().map(function).collect() }
     }
 
-    /// The response functions of all sensors of `layout`, watched while the surface is solved.
+    /// [`CleanSensors::new`], watched.
     ///
     /// # Errors
-    /// [`Cancelled`] when the watch stopped it.
+    /// [`Cancelled`].
     pub fn new_watched(surface: &'a dyn Surface, layout: &Layout, watch: Watch) -> Result<Self, Cancelled> {
         // One by one, as without a watch: a joint solution might differ in the last bit.
         let function =
@@ -85,41 +83,39 @@ impl<'a> CleanSensors<'a> {
         Ok(Self { functions: functions.into_iter().flatten().collect() })
     }
 
-    /// Faultless reading of the sensors under `contact`, in the SI unit of each sensor.
+    /// Returns the faultless reading, in SI units.
     pub fn reading(&self, contact: Contact) -> Vec<f64> {
         self.functions.iter().map(|function| function.at(contact)).collect()
     }
 }
 
-/// Faultless reading of the sensors of `layout` when `contact` touches `surface`; for more than one contact
-/// of the same surface see [`CleanSensors`].
+/// Returns the faultless reading of one contact; see [`CleanSensors`].
 pub fn clean_reading(surface: &dyn Surface, layout: &Layout, contact: Contact) -> Vec<f64> {
     CleanSensors::new(surface, layout).reading(contact)
 }
 
 impl Setup {
-    /// The bench during calibration: with the force of the training presses.
+    /// Returns the setup with the force of the presses.
     ///
     /// # Errors
-    /// [`OutOfRange`] for a force of the presses that is not greater than 0 and finite.
+    /// [`OutOfRange`].
     pub fn pressed_by(&self, training: &Training) -> Result<Self, OutOfRange> {
         self.clone().with_force(training.force_n.or(self.force_n()))
     }
 
-    /// Presses the simulated surface at the training positions, with the force of the training presses, and records what its
-    /// faulty channels report; see [`simulate_at`]. With imperfections the presses are displaced from the positions of their rows by the placement of
-    /// the training.
+    /// Simulates training presses; see [`simulate_at`]. With imperfections they are displaced by the
+    /// training's placement.
     ///
     /// # Errors
-    /// [`SimulateError`] when the bench lacks a model or a force, or the positions cannot be laid out.
+    /// [`SimulateError`] without a model or a force, or for invalid positions.
     pub fn simulate(&self, training: &Training, seed: u64) -> Result<Recording, SimulateError> {
         self.simulate_watched(training, seed, Watch::NONE)
     }
 
-    /// Simulates the presses of `training`, watched.
+    /// [`Setup::simulate`], watched.
     ///
     /// # Errors
-    /// As for [`Setup::simulate`], and [`SimulateError::Cancelled`].
+    /// As there, and [`SimulateError::Cancelled`].
     pub fn simulate_watched(
         &self,
         training: &Training,
@@ -133,16 +129,14 @@ impl Setup {
     }
 }
 
-/// Presses the bench's simulated surface with its force at each of `positions`, `repeats` times in a row, and records what its
-/// faulty channels report. Gains, offsets and the places of sensors are drawn once for the recording, noise for each reading.
+/// Simulates `repeats` presses at each position. Gains, offsets and sensor positions are drawn once, noise
+/// for each reading; a seed determines the recording.
 ///
-/// A setup with imperfections has a course in time. Each press is read `repeats` times; untouched rows (force 0) stand before the presses,
-/// between them and after them; every row has its time; see [`Schedule`].
-///
-/// Equal seeds give equal recordings.
+/// With imperfections these are readings of one press, with times, and untouched rows (force 0) separate
+/// presses; see [`Schedule`].
 ///
 /// # Errors
-/// [`SimulateError`] when the bench lacks a model or a force, or a position lies off the surface.
+/// [`SimulateError`] without a model or a force, or off the surface.
 pub fn simulate_at(
     setup: &Setup,
     positions: &[Position],
@@ -152,10 +146,10 @@ pub fn simulate_at(
     simulate_at_watched(setup, positions, repeats, seed, Watch::NONE)
 }
 
-/// Presses the simulated surface as by [`simulate_at`], watched.
+/// [`simulate_at`], watched.
 ///
 /// # Errors
-/// As for [`simulate_at`], and [`SimulateError::Cancelled`].
+/// As there, and [`SimulateError::Cancelled`].
 pub fn simulate_at_watched(
     setup: &Setup,
     positions: &[Position],
@@ -166,7 +160,7 @@ pub fn simulate_at_watched(
     simulate_contacts_watched(setup, &contacts_at(setup, positions)?, repeats, seed, watch)
 }
 
-/// Contacts at positions with the force of a bench with a model.
+/// Returns contacts with the setup's force.
 ///
 /// # Errors
 /// [`SimulateError::NoModel`] and [`SimulateError::NoForce`].
@@ -176,9 +170,8 @@ pub fn contacts_at(setup: &Setup, positions: &[Position]) -> Result<Vec<Contact>
     Ok(positions.iter().map(|position| Contact { position: *position, force_n }).collect())
 }
 
-/// Touches a calibrated bench in use with each of `contacts`, once, and records it, watched. A bench with imperfections is the one of the
-/// calibration with this provenance, after the pause of its schedule; the seed draws noise and random walks from there on. Another bench is drawn
-/// from the seed as by [`simulate_contacts`].
+/// Simulates contacts in use, watched. A bench with imperfections continues from its calibration after the
+/// scheduled pause; another is new.
 ///
 /// # Errors
 /// As for [`simulate_contacts_watched`].
@@ -200,10 +193,10 @@ pub fn simulate_use_watched(
     bench.record(&presses, None, watch)
 }
 
-/// Presses the simulated surface as by [`simulate_at`], with a force of each contact's own.
+/// [`simulate_at`], with each contact's own force.
 ///
 /// # Errors
-/// [`SimulateError`] when the bench lacks a model, or a contact lies off the surface.
+/// [`SimulateError`] without a model, or off the surface.
 pub fn simulate_contacts(
     setup: &Setup,
     contacts: &[Contact],
@@ -213,10 +206,10 @@ pub fn simulate_contacts(
     simulate_contacts_watched(setup, contacts, repeats, seed, Watch::NONE)
 }
 
-/// Presses the simulated surface as by [`simulate_contacts`], watched.
+/// [`simulate_contacts`], watched.
 ///
 /// # Errors
-/// As for [`simulate_contacts`], and [`SimulateError::Cancelled`].
+/// As there, and [`SimulateError::Cancelled`].
 pub fn simulate_contacts_watched(
     setup: &Setup,
     contacts: &[Contact],
@@ -227,8 +220,7 @@ pub fn simulate_contacts_watched(
     simulate_presses_watched(setup, contacts, repeats, None, seed, watch)
 }
 
-/// Simulates presses of these contacts, watched; see [`simulate_contacts`]. Where the bench has imperfections, the pressed places deviate
-/// from those of the contacts by the standard deviation `placement_sd_m` in each direction, in metres.
+/// [`simulate_contacts`], watched; with imperfections displaced by `placement_sd_m`.
 ///
 /// # Errors
 /// As for [`simulate_contacts_watched`].
@@ -263,14 +255,10 @@ pub fn simulate_presses_watched(
     Ok(Recording::new(setup.layout(), "simulation", rows).seeded(seed))
 }
 
-/// Spreads `loads` over the bench's simulated surface, all at once, `repeats` times in a row, and returns the readings of its faulty
-/// channels. Gains, offsets and the places of sensors are drawn once, noise for each reading. Imperfections act by their schedule; a soft layer
-/// does not, as the loads themselves define their extent.
-///
-/// Equal seeds give equal readings.
+/// Simulates readings of all `loads` at once, drawn as in [`simulate_at`], without a soft layer.
 ///
 /// # Errors
-/// [`SimulateError::NoModel`] for a measured surface.
+/// [`SimulateError::NoModel`].
 pub fn simulate_loads(
     setup: &Setup,
     loads: &[UniformLoad],
@@ -280,10 +268,10 @@ pub fn simulate_loads(
     simulate_loads_watched(setup, loads, repeats, seed, Watch::NONE)
 }
 
-/// Spreads `loads` as by [`simulate_loads`], watched.
+/// [`simulate_loads`], watched.
 ///
 /// # Errors
-/// As for [`simulate_loads`], and [`SimulateError::Cancelled`].
+/// As there, and [`SimulateError::Cancelled`].
 pub fn simulate_loads_watched(
     setup: &Setup,
     loads: &[UniformLoad],
@@ -317,10 +305,9 @@ pub fn simulate_loads_watched(
     Ok(readings)
 }
 
-/// The places of the sensors, the gains and offsets of the channels, and the stream of their noise.
 fn draw_faults(setup: &Setup, seed: u64) -> (Layout, ChannelErrors, Xoshiro256PlusPlus) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    // Places have their own random stream, so the noise does not depend on displaced sensors.
+    // Positions have their own random stream, so the noise does not depend on displaced sensors.
     let mut places = rng.clone();
     places.jump();
     let placed = displaced(setup.layout(), setup.surface().extent(), &mut places);
@@ -328,8 +315,7 @@ fn draw_faults(setup: &Setup, seed: u64) -> (Layout, ChannelErrors, Xoshiro256Pl
     (placed, errors, rng)
 }
 
-/// The layout of one simulated bench: every sensor lies within its position error of its place, clamped to the surface. A perfectly placed
-/// sensor stays where it is.
+/// Sensors within their position errors, clamped to the surface.
 pub(crate) fn displaced(layout: &Layout, extent: Extent, rng: &mut impl Rng) -> Layout {
     layout.clone().with_positions(|sensor| {
         let error_m = sensor.channel.position_error_m;

@@ -1,16 +1,16 @@
-//! Splits of recordings into a part to fit and a part to judge by.
+//! Splits into training and judged recordings.
 
 use crate::offset_course::OffsetCourse;
 use crate::recording::{Fold, Recording, TooFewPositions};
 
-/// A recording to fit, and one to judge by, with contacts that the fit does not use.
+/// Training and judged recordings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Split {
     /// Recording to fit.
     pub training: Recording,
     /// Recording to judge by.
     pub judged: Recording,
-    /// Offsets at the rows to judge by, to be brought to those that a locator learns; `None` to judge by the readings as they are.
+    /// Offsets of the judged rows, to be replaced by learnt ones.
     pub offsets: Option<OffsetCourse>,
     /// Origin.
     pub origin: SplitOrigin,
@@ -19,14 +19,14 @@ pub struct Split {
 /// Origin of a split.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SplitOrigin {
-    /// A fold of a recording: intervals are widened as those of a locator that is fitted to all of it, by the factor of the other folds.
+    /// Fold, with intervals widened by the others.
     Fold,
-    /// A calibration of its own: intervals are those of the method.
+    /// Calibration, with the method's intervals.
     Calibration,
 }
 
 impl Split {
-    /// A split for each fold of a recording, by position.
+    /// Returns a split per fold.
     ///
     /// # Errors
     /// [`TooFewPositions`] as for [`Recording::folds`].

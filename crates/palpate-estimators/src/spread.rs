@@ -1,38 +1,31 @@
-//! Test for a distributed contact: a second contact close by, or a patch, instead of a single point.
+//! Score test for a distributed contact: two contacts or a patch.
 //!
-//! Two contacts at a − h and a + h, or a patch that presses with variance h² about a, read W·(f(a) + ½·h²·f″(a) + …): f influence, W total
-//! force. A point contact explains the part of the change along f″ that lies along f and f′, by a greater force and a displacement. The
-//! remainder has a direction u of unit length, over the noise. With the residual e of the best point contact, z = e·u is a standard normal
-//! variable for a point contact, and greater where h² > 0. This is the score of h² at 0 (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948), the
-//! most powerful test of a small h. χ² tests all directions, and so has less power along each. On a plane h² is a matrix of three numbers,
-//! f″ are three derivatives, and Σz² along three directions is χ² of three degrees of freedom.
+//! Contacts at a ± h, or a patch of variance h², read W·(f(a) + ½·h²·f″(a) + …). Let u be the unit direction
+//! of f″ across f and f′, over the noise, and e the residual of the best point contact. Then z = e·u is
+//! standard normal, and greater for h² > 0: the score of h² at 0 (C. R. Rao, Proc. Camb. Phil. Soc. 44,
+//! 1948), the most powerful test of a small h. On a plane Σz² of three derivatives is χ².
 //!
-//! A residual is at right angles to f and f′ for any u. So differences in place of derivatives, or a u of a place near by, do not increase
-//! the error rate of z. They reduce its power a little.
+//! Differences in place of derivatives keep the error rate, as residuals are orthogonal to f and f′.
 
 use crate::status::SPREAD_RATE;
 use palpate_numerics::small::dot;
 use palpate_numerics::{chi_squared_critical_value, push_rest};
 use std::sync::OnceLock;
 
-/// Contact about which readings are expanded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct About {
-    /// Position along and across, and force or another unknown of the reading.
+    /// Position along and across, and force.
     pub at: [f64; 3],
-    /// Ends of each unknown; both ends are equal for a known quantity.
+    /// Equal ends for a known quantity.
     pub ends: [(f64, f64); 3],
 }
 
-/// Share of a side over which second differences are taken on either side: short against the way over which influences bend, and long against
-/// the distance between the nodes of a table.
+/// Reach of differences: short against the bends of influences, long against the nodes of a table.
 const REACH: f64 = 1.0 / 32.0;
-/// Share of the reach over which first differences are taken.
 const STEP: f64 = 1e-3;
-/// Least share of a direction that must lie across the others; a direction with less is omitted.
+/// Least share across the other directions.
 const LEAST_LEFT: f64 = 1e-3;
 
-/// Directions of unit length along which a distributed contact changes a reading, and a point contact does not.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SpreadDirections {
     units: Vec<Vec<f64>>,
@@ -40,7 +33,7 @@ pub(crate) struct SpreadDirections {
 }
 
 impl SpreadDirections {
-    /// The directions about a contact; `reads` gives the reading of a contact, channel by channel, over the noise about this one.
+    /// `reads` returns the reading of a contact over the noise.
     pub fn about(About { at, ends }: About, mut reads: impl FnMut([f64; 3]) -> Vec<f64>) -> Self {
         let side = |k: usize| ends[k].1 - ends[k].0;
         let is_free = |k: usize| side(k) > 0.0;
@@ -75,7 +68,7 @@ impl SpreadDirections {
         Self { units: basis.split_off(tangents), is_line }
     }
 
-    /// The squared component of a residual along the directions. On a line, a distributed contact has only one sign; the score is 0 for the other.
+    /// Squared component; on a line, 0 for the wrong sign.
     pub fn score(&self, residual: &[f64]) -> f64 {
         let along = |unit: &Vec<f64>| dot(unit, residual);
         match self.units.as_slice() {
@@ -84,13 +77,12 @@ impl SpreadDirections {
         }
     }
 
-    /// The direction on a line; `None` where there is none.
     pub fn on_line(self) -> Option<Vec<f64>> {
         self.units.into_iter().next().filter(|_| self.is_line)
     }
 }
 
-/// Score of a reading about the contact that explains it best; `reads` as for [`SpreadDirections::about`], and the reading over the same noise.
+/// About the best point contact; `reads` as for [`SpreadDirections::about`].
 pub(crate) fn spread_score(
     about: About,
     reading: impl IntoIterator<Item = f64>,
@@ -100,7 +92,7 @@ pub(crate) fn spread_score(
     SpreadDirections::about(about, reads).score(&residual)
 }
 
-/// The score that a point contact exceeds at [`SPREAD_RATE`], on a surface of so many dimensions.
+/// Critical value at [`SPREAD_RATE`].
 pub(crate) fn spread_bound(dimensions: usize) -> f64 {
     static KNOWN: [OnceLock<f64>; 2] = [const { OnceLock::new() }; 2];
     if dimensions == 1 {

@@ -1,21 +1,16 @@
-//! The rule by which an estimate is `no_contact`, `outside_model` or `ambiguous`. All estimators with a known noise of their channels share it.
+//! Rule of `no_contact`, `outside_model` and `ambiguous` for known noise.
 //!
-//! - `no_contact`: a reading passes two conditions. Noise alone exceeds |d|², the squared length of the whitened reading d (less offsets,
-//!   over the noise), more often than half the [`FalseAlarmRate`]. The best contact reduces |d|² by no more than the cost of a contact.
-//!   Noise alone fails the first condition at half the rate. The cost of a contact is that of the extended Bayesian information criterion
-//!   at a rate of 0.2 %. The probability Φ(−√cost) that noise exceeds the cost along one contact's reading is proportional to the rate; this
-//!   gives the cost at other rates. A cost is not a quantile: noise fails the second condition at a rate that depends on the numbers of
-//!   channels and places. It is 0.3 to 1 times the set rate on the benches of docs/validation/tables/at-the-limit.md. Force-linear surfaces without a model
-//!   have `NoiseBounds` instead, which noise fails at the rate itself.
-//! - `outside_model`: a contact of the model exceeds the χ² of the best contact less often than [`OUTSIDE_MODEL_RATE`], or the contact
-//!   seems distributed. A point contact seems distributed less often than [`SPREAD_RATE`]. The residual of a distributed contact lies along
-//!   the second derivative of the influences (estimators of a finger do without this test).
-//! - `ambiguous`: another place has a share of at least [`OTHER_PLACE`] of the posterior probability, or the position is undetermined: the
-//!   95 % interval covers at least the share [`PLACE_LEFT_OPEN`] of every side of the surface, as for a contact that may be anywhere.
+//! - `no_contact`: noise exceeds the squared length |d|² of the whitened reading more often than half the
+//!   [`FalseAlarmRate`], and the best contact reduces |d|² by at most its cost: the extended Bayesian
+//!   information criterion at 0.2 %, with Φ(−√cost) in proportion to the rate. The actual rate is 0.3 to 1
+//!   times the set one (docs/validation/tables/at-the-limit.md), exact with the `NoiseBounds` of force-linear
+//!   surfaces.
+//! - `outside_model`: the best χ² exceeds its critical value at [`OUTSIDE_MODEL_RATE`], or the contact seems
+//!   distributed at [`SPREAD_RATE`] (not for digits).
+//! - `ambiguous`: another mode has at least the probability [`OTHER_PLACE`], or the 95 % interval covers
+//!   [`PLACE_LEFT_OPEN`] of every side.
 //!
-//! An engineer can accept one to three false alarms in a thousand readings. A channel that is read a hundred times a second then gives one
-//! every few seconds, and a tracker averages it away. A rate ten times lower moves both bounds by a tenth of their size, and misses
-//! contacts that are stronger by that much.
+//! A rate ten times lower raises both bounds by a tenth.
 
 use crate::recording::Recording;
 use crate::thinning::thinned;
@@ -27,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
-/// Share of the readings of an untouched surface that may be mistaken for a contact: 0.0001 % to 10 %.
+/// Share of untouched readings detected as a contact.
 ///
 /// ```
 /// use palpate_estimators::status::FalseAlarmRate;
@@ -43,24 +38,24 @@ use std::sync::OnceLock;
 pub struct FalseAlarmRate(f64);
 
 impl FalseAlarmRate {
-    /// The range of rates, as shares. Below it the tails of real noise are not normal; above it every other reading is an alarm.
+    /// Range of rates; below it the tails of real noise are not normal.
     pub const RANGE: std::ops::RangeInclusive<f64> = 1e-6..=0.1;
-    /// The range in words.
+    /// Range in words.
     pub const RANGE_IN_WORDS: &'static str = "at least 0.0001 % and at most 10 %";
     /// One in a thousand.
     pub const DEFAULT: Self = Self(1e-3);
 
-    /// A rate, as a share of the readings.
+    /// Returns a rate.
     ///
     /// # Errors
-    /// [`OutOfRange`] for a rate that is not in [`FalseAlarmRate::RANGE`].
+    /// [`OutOfRange`] outside [`FalseAlarmRate::RANGE`].
     pub fn new(share: f64) -> Result<Self, OutOfRange> {
         let number = [("the false-alarm rate", share)];
         OutOfRange::check(Self::RANGE_IN_WORDS, number, |share| Self::RANGE.contains(&share))?;
         Ok(Self(share))
     }
 
-    /// The share of the readings.
+    /// Share of readings.
     pub const fn share(self) -> f64 {
         self.0
     }
@@ -94,37 +89,32 @@ impl std::fmt::Display for FalseAlarmRate {
     }
 }
 
-/// Share of the readings of contacts that are `outside_model` by noise alone.
+/// Share of contacts that are `outside_model` by noise.
 pub const OUTSIDE_MODEL_RATE: f64 = 1e-3;
 
-/// Share of the readings of point contacts that are `outside_model` as those of a distributed contact: two contacts close by, or a patch.
+/// Share of point contacts that seem distributed by noise.
 pub const SPREAD_RATE: f64 = 2e-3;
 
-/// Significance level of the tests whether noise explains a recording: untouched rows that are contacts, their drift, presses that are
-/// `outside_model`. This is the usual level of statistics: one recording in twenty fails by noise alone.
+/// Significance level of tests on recordings.
 pub(crate) const SIGNIFICANCE: f64 = 0.05;
 
-/// The least share of the posterior probability for another place to make an estimate `ambiguous`. Among `located` readings, fewer than one
-/// in a hundred comes from another place than the estimated one.
+/// Least probability of another mode in an `ambiguous` estimate.
 pub const OTHER_PLACE: f64 = 0.01;
 
-/// Share of a side of the surface that the 95 % interval covers for a contact that may be anywhere along it.
+/// Share of a side that an undetermined interval covers.
 pub const PLACE_LEFT_OPEN: f64 = 0.95;
 
-/// χ² that noise exceeds at [`OUTSIDE_MODEL_RATE`], with `freedom` channels more than unknowns; for 0, the χ² of 1. Contacts press and lie
-/// on the surface, so with as many channels as unknowns a contact need not explain the reading. The residual of the best contact is then
-/// the noise along the direction in which an end of the surface, or the force 0, limits it.
+/// Critical value of χ² with at least 1 degree of freedom, as bounds of force and surface restrict every
+/// contact.
 pub(crate) fn misfit_bound(freedom: usize) -> f64 {
-    /// Computed bounds: estimators that weight their channels anew for each reading need one every time.
     static KNOWN: [OnceLock<f64>; 65] = [const { OnceLock::new() }; 65];
     let freedom = freedom.max(1);
     let bound = || chi_squared_critical_value(OUTSIDE_MODEL_RATE, freedom);
     KNOWN.get(freedom).map_or_else(bound, |known| *known.get_or_init(bound))
 }
 
-/// |d|² that noise of so many channels exceeds at half a rate.
+/// |d|² that noise exceeds at half a rate.
 fn noise_bound(channels: usize, rate: FalseAlarmRate) -> f64 {
-    /// Computed bounds at the default rate: some estimators need one for each reading.
     static KNOWN: [OnceLock<f64>; 65] = [const { OnceLock::new() }; 65];
     let channels = channels.max(1);
     let bound = || chi_squared_critical_value(0.5 * rate.0, channels);
@@ -134,22 +124,18 @@ fn noise_bound(channels: usize, rate: FalseAlarmRate) -> f64 {
     }
 }
 
-/// The cost of a contact at half a rate, from the cost at 0.1 %. The probability that noise exceeds it along the reading of a contact is
-/// proportional to the rate.
+/// Cost of a contact, scaled from 0.1 % to half a rate.
 fn detection_cost(contact_cost: f64, rate: FalseAlarmRate) -> f64 {
     let tail = normal_cdf(-contact_cost.sqrt()) * 0.5 * rate.0 / FalseAlarmRate::DEFAULT.0;
     bisect((0.0, 20.0), 40, |u| normal_cdf(-u) > tail).powi(2)
 }
 
-/// Bounds of χ², of the score of a distributed contact or the like, for a surface that is known by its recording alone. Beyond them no
-/// contact explains a reading. Each is the bound for `normal` noise, and at least twice the value that one in a hundred of the recording's
-/// own readings exceeds, as real noise has longer tails.
+/// Bounds of at least twice the recording's 99th percentile, as real noise has longer tails.
 pub(crate) fn learnt_bounds<const N: usize>(
     normal: [f64; N],
     recording: &Recording,
     left: impl Fn(&[f64]) -> [f64; N],
 ) -> [f64; N] {
-    /// The most readings that are used.
     const TRIED: usize = 400;
     let rows = &recording.rows;
     let tried: Vec<[f64; N]> = thinned(rows.len(), TRIED).map(|i| left(&rows[i].reading)).collect();
@@ -161,37 +147,28 @@ pub(crate) fn learnt_bounds<const N: usize>(
     })
 }
 
-/// Places along a line that readings distinguish.
 pub(crate) const LINE_PLACES: usize = 33;
 
-/// Cost in χ² of a contact with so many unknowns, read by so many channels, that could have been at so many places, by the extended
-/// Bayesian information criterion (Chen and Chen, Biometrika 95, 2008): unknowns·ln channels + 2·ln places.
+/// Extended Bayesian information criterion (Chen and Chen, Biometrika 95, 2008): unknowns·ln channels + 2·ln
+/// places.
 pub(crate) fn contact_cost(unknowns: usize, channels: usize, places: usize) -> f64 {
     unknowns as f64 * (channels as f64).ln() + 2.0 * (places as f64).ln()
 }
 
-/// Number of unknowns of a contact: the coordinates of its position, and its force where that is not known.
 pub(crate) fn unknowns(coordinates: usize, force_n: Option<f64>) -> usize {
     coordinates + usize::from(force_n.is_none())
 }
 
-/// The bounds of `no_contact` and `outside_model`, for readings of given channels.
-///
-/// Symbols: |d|² squared length of the whitened reading, χ² chi-squared of the best contact.
+/// Bounds on |d|² of the whitened reading and χ² of the best contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct StatusRule {
-    /// Largest |d|² of noise alone.
     noise_bound: f64,
-    /// Least |d|² − χ² of a contact.
     detection_cost: f64,
-    /// Cost of a contact beside others.
     contact_cost: f64,
-    /// Largest χ² of a contact.
     misfit_bound: f64,
 }
 
 impl StatusRule {
-    /// The rule for `channels` with known noise, and a contact with so many unknowns that could be at so many places.
     pub fn new(channels: usize, unknowns: usize, places: usize, rate: FalseAlarmRate) -> Self {
         let contact_cost = contact_cost(unknowns, channels, places);
         Self {
@@ -202,52 +179,48 @@ impl StatusRule {
         }
     }
 
-    /// The rule for a reading of channels with unknown noise: only zeros are `no_contact`, and the best contact may leave the share
-    /// `misfit` of the reading's `square`.
+    /// Only zeros are `no_contact`; χ² may be the share `misfit` of `square`.
     pub fn without_noise(square: f64, misfit: f64) -> Self {
         Self { noise_bound: 0.0, detection_cost: 0.0, contact_cost: 0.0, misfit_bound: misfit * square }
     }
 
-    /// Whether noise alone gives readings of length `square` = |d|².
+    /// True where noise explains |d|² = `square`.
     #[inline(always)]
     pub fn is_within_noise(&self, square: f64) -> bool {
         square <= self.noise_bound
     }
 
-    /// Whether noise alone explains a reading of length `square` = |d|², and no worse than a contact with the χ² `misfit`.
+    /// True where noise explains |d|² = `square`, no worse than χ² = `misfit`.
     #[inline(always)]
     pub fn is_no_contact(&self, square: f64, misfit: f64) -> bool {
         square <= misfit + self.detection_cost && self.is_within_noise(square)
     }
 
-    /// Reduction of `square` = |d|² by a contact with the χ² `misfit`, less the smallest reduction for which a reading within the noise
-    /// counts as a contact.
+    /// Reduction of `square`, less the one that detection needs.
     pub fn taken_beyond_cost(&self, square: f64, misfit: f64) -> f64 {
         square - misfit - self.detection_cost
     }
 
-    /// Whether a contact with the χ² `misfit` explains the reading; otherwise it is `outside_model`.
+    /// True for an explained reading.
     #[inline(always)]
     pub fn is_explained(&self, misfit: f64) -> bool {
         misfit <= self.misfit_bound
     }
 
-    /// Bounds from which the rule detects a contact with so many unknowns in readings of so many channels.
     pub fn detection(&self, channels: usize, unknowns: usize) -> Detection {
         Detection { channels, unknowns, square: self.noise_bound, taken: self.detection_cost }
     }
 
-    /// Cost in χ² of a contact beside others, which does not depend on the false-alarm rate.
+    /// Cost beside other contacts, at any false-alarm rate.
     pub fn contact_cost(&self) -> f64 {
         self.contact_cost
     }
 }
 
-/// Extent of the directions f/|f| that readings of contacts have: the length ℓ of their curve over a line and no area; half the length
-/// of their boundary and their area A over a plane.
+/// Directions f/|f| of contacts: curve length ℓ on a line; half the boundary length ℓ and area A on a plane.
 ///
-/// Noise d of unit variance has a component greater than u along one of them with the probability
-/// Φ(−u) + e^(−u²/2)·(ℓ/2π + A·u/(2π)^(3/2)) (S. O. Rice 1944; Adler and Taylor, *Random Fields and Geometry*, 2007, chapter 14).
+/// Noise exceeds u along one with probability Φ(−u) + e^(−u²/2)·(ℓ/2π + A·u/(2π)^(3/2)) (S. O. Rice 1944;
+/// Adler and Taylor, *Random Fields and Geometry*, 2007, chapter 14).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Directions {
     pub length: f64,
@@ -255,14 +228,11 @@ pub(crate) struct Directions {
 }
 
 impl Directions {
-    /// Probability that noise has a component greater than `u` along a direction.
     fn exceeded(self, u: f64) -> f64 {
         normal_cdf(-u) + (-0.5 * u * u).exp() * (self.length / TAU + self.area * u / TAU.powf(1.5))
     }
 
-    /// Probability that noise of so many channels has a component greater than `u` along a direction while |d|² is at most `square`. Each
-    /// term of [`Directions::exceeded`] is the integral of a density of the component. The remainder of |d|² is χ² of the channels that the
-    /// term does not use.
+    /// Terms of [`Directions::exceeded`] as integrals, with χ² of the remaining channels.
     fn exceeded_within(self, u: f64, square: f64, channels: usize) -> f64 {
         const STEPS: usize = 64;
         let most = square.sqrt();
@@ -281,18 +251,14 @@ impl Directions {
     }
 }
 
-/// Bounds of noise: on |d|², and on its reduction by the best contact. Noise exceeds each of them equally often, and at least one of them
-/// at the false-alarm rate.
+/// Bounds on |d|² and its reduction, exceeded equally often, and one of them at the false-alarm rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct NoiseBounds {
-    /// Largest |d|² of noise alone.
     pub square: f64,
-    /// Largest reduction of |d|² by a contact.
     pub taken: f64,
 }
 
 impl NoiseBounds {
-    /// The bounds for so many channels, by the directions of their contacts.
     pub fn new(channels: usize, directions: Directions, rate: FalseAlarmRate) -> Self {
         let of_tail = |tail: f64| {
             let u = bisect((0.0, 20.0), 50, |u| directions.exceeded(u) > tail);
@@ -307,15 +273,14 @@ impl NoiseBounds {
     }
 }
 
-/// Bounds from which a contact is detected: a rule of `no_contact` for channels of unit noise.
+/// Detection bounds for channels of unit noise.
 ///
-/// Symbols: d whitened reading, n channels, k unknowns of a contact (its coordinates and its unknown force), s length of the contact's own
-/// whitened reading (its signal-to-noise ratio), B the bound on |d|² and C the bound on its reduction by the best contact.
+/// Symbols: d whitened reading, n channels, k unknowns, s signal-to-noise ratio, B bound on |d|², C bound on
+/// its reduction.
 ///
-/// Near the contact, the readings of all others span k dimensions, along its own reading and along its tangents. So the best of them
-/// reduces |d|² = u + w by u = (s + z)² + v, with z normal, v χ² of k − 1 and w χ² of n − k degrees of freedom, all independent. The
-/// contact is missed where u ≤ C and u + w ≤ B. This is valid to first order: contacts with distant readings, and the curvature of the
-/// readings between, are neglected.
+/// Nearby contacts span k dimensions, so the best one reduces |d|² = u + w by u = (s + z)² + v, with
+/// independent z normal, v χ² of k − 1 and w χ² of n − k degrees of freedom. To first order a contact is
+/// missed for u ≤ C and u + w ≤ B.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Detection {
     /// n.
@@ -329,17 +294,16 @@ pub(crate) struct Detection {
 }
 
 impl Detection {
-    /// Probability that a contact of signal-to-noise ratio `signal` is detected.
     pub fn probability(&self, signal: f64) -> f64 {
         const STEPS: usize = 80;
-        /// Standard deviations beyond which the probability of a normal variable is negligible.
         const FAR: f64 = 7.0;
         let Self { channels, unknowns, square, taken } = *self;
         let tangents = unknowns.min(channels).saturating_sub(1);
         let rest = channels.saturating_sub(unknowns);
         let below = |left: f64| if left < 0.0 { 0.0 } else { 1.0 - chi_squared_survival(left, rest) };
         let normal = |z: f64| (-0.5 * z * z).exp() / TAU.sqrt();
-        // Probability of a miss for a component x = s + z along the contact, integrated over the length y of the component along the tangents.
+        // Probability of a miss for a component x = s + z along the contact, integrated over the length y of
+        // the component along the tangents.
         let missed = |x: f64| {
             let room = (taken - x * x).max(0.0);
             match tangents {
@@ -360,24 +324,21 @@ impl Detection {
         1.0 - simpson((from, to), STEPS, |x| normal(x - signal) * missed(x))
     }
 
-    /// Signal-to-noise ratio of a contact that is detected with a probability.
     pub fn signal(&self, probability: f64) -> f64 {
         let most = self.taken.sqrt() + self.square.sqrt() + 10.0;
         bisect((0.0, most), 40, |signal| self.probability(signal) < probability)
     }
 }
 
-/// Integral by Simpson's rule, of an even number of steps.
 fn simpson((from, to): (f64, f64), steps: usize, of: impl Fn(f64) -> f64) -> f64 {
     let step = (to - from) / steps as f64;
     let weight = |i: usize| if i == 0 || i == steps { 1.0 } else { 2.0 + 2.0 * (i % 2) as f64 };
     (0..=steps).map(|i| weight(i) * of(from + i as f64 * step)).sum::<f64>() * step / 3.0
 }
 
-/// The estimate of a reading that contains only noise.
 pub(crate) const NO_CONTACT: Estimate = Estimate::of_position(Position::along(0.0), Status::NoContact);
 
-/// The estimate with the status `ambiguous` instead of `located` where the position is undetermined.
+/// Makes an undetermined estimate `ambiguous`.
 pub(crate) fn unless_left_open(estimate: Estimate, extent: Extent) -> Estimate {
     let is_left_open = estimate.contact.uncertainty.is_some_and(|uncertainty| {
         let is_open = |(low, high): (f64, f64), side_m: f64| {
@@ -392,7 +353,7 @@ pub(crate) fn unless_left_open(estimate: Estimate, extent: Extent) -> Estimate {
     }
 }
 
-/// The estimate of a method without a noise model: located, or outside the surface.
+/// Without a noise model: located, or outside the surface.
 pub(crate) fn on_surface(contact: ContactEstimate, extent: Extent) -> Estimate {
     let status = if extent.contains(contact.position) { Status::Located } else { Status::OutsideSurface };
     Estimate::of_contact(contact, status)

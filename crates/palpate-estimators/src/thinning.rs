@@ -1,13 +1,9 @@
-//! Even subsets of many items, out of step with a periodic order.
-//!
-//! Recordings return to the same places again and again, and grids are numbered row by row. Every k-th item omits places where k and the
-//! period have a common divisor. Every second press of a line that is pressed at forty places in turn covers twenty places.
+//! Even subsets of items, out of step with a periodic order.
 
-/// Indices of at most `most` of `len` items, rising: one from every `len`/`most` items, with a varying offset, as the order may be
-/// periodic. All indices where `len` is at most `most`.
+/// One rising index from every `len`/`most` items, as recordings return to positions in turn.
 ///
 /// # Panics
-/// When `most` is 0.
+/// For `most` = 0.
 pub(crate) fn thinned(len: usize, most: usize) -> impl ExactSizeIterator<Item = usize> + Clone {
     /// Golden ratio less 1: its multiples never come near a period.
     const IRRATIONAL: f64 = 0.618_033_988_749_895;

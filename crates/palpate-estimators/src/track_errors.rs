@@ -1,4 +1,4 @@
-//! Errors of a track and of its single readings, and their growth with the contact's speed.
+//! Errors of tracks and of single readings.
 
 use crate::estimator::{
     ContactEstimate, Estimate, Locator, NotTrackable, SmoothTracker, Status, Track, TrackError, Tracked,
@@ -12,29 +12,27 @@ use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// Mean errors over the contacts while they touched, in metres, and coverage of the 95 % intervals. Several detected contacts are paired
-/// with the true ones such that the sum of the distances is least.
+/// Mean errors in metres and coverage of 95 % intervals. Contacts are paired with the least sum of distances.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct TrackErrors {
-    /// Number of readings with at least one contact.
+    /// Readings with contact.
     pub readings: usize,
-    /// Number of touching contacts that the tracker had, over all readings. The errors of the track are those of these contacts.
+    /// Tracked touching contacts.
     pub tracked: usize,
-    /// Mean error of single readings.
+    /// Error of single readings.
     pub single_m: f64,
-    /// Mean error of the track.
+    /// Error of tracks.
     pub track_m: f64,
-    /// Share of the contacts of single readings with an interval that contains the true one.
+    /// Coverage by single readings.
     pub single_covered: f64,
-    /// Share of the track's intervals that contain the true one.
+    /// Coverage by tracks.
     pub track_covered: f64,
-    /// Share of all readings at which the single reading gives the true number of contacts.
+    /// Share of single readings with the true number of contacts.
     pub single_number_right: f64,
-    /// Share of all readings at which the tracker has the true number of contacts.
+    /// Share of tracks with the true number of contacts.
     pub track_number_right: f64,
 }
 
-/// Sums over contacts.
 #[derive(Default)]
 struct Sums {
     contacts: usize,
@@ -44,7 +42,6 @@ struct Sums {
 }
 
 impl Sums {
-    /// Adds the true and the detected contacts of a reading.
     fn add(&mut self, truths: &[Position], found: &[ContactEstimate], extent: Extent) {
         self.numbers_right += usize::from(truths.len() == found.len());
         let places: Vec<Position> = found.iter().map(|contact| contact.position).collect();
@@ -62,8 +59,7 @@ impl Sums {
 }
 
 impl TrackErrors {
-    /// Compares tracks with the true contacts of each, which have force 0 where they do not touch; `None` where no contact touched, or none
-    /// was tracked.
+    /// Compares tracks with true contacts of force 0 if untouched; `None` without tracked contacts.
     pub fn new(tracks: &[Track], truths: &[Vec<Contact>], extent: Extent) -> Option<Self> {
         let (mut readings, mut single, mut track) = (0, Sums::default(), Sums::default());
         for (one, truths) in tracks.iter().zip(truths) {
@@ -87,13 +83,13 @@ impl TrackErrors {
         })
     }
 
-    /// Mean error of the single readings over that of the track.
+    /// Ratio of errors, single over track.
     pub fn ratio(&self) -> f64 {
         self.single_m / self.track_m
     }
 }
 
-/// The contacts of a single reading; while a contact touches, at least the best guess.
+/// Best estimate while touched.
 fn contacts_of_single(estimate: &Estimate, touched: bool) -> Vec<ContactEstimate> {
     if !touched && estimate.status == Status::NoContact {
         return Vec::new();
@@ -101,7 +97,7 @@ fn contacts_of_single(estimate: &Estimate, touched: bool) -> Vec<ContactEstimate
     std::iter::once(&estimate.contact).chain(estimate.further.as_slice()).copied().collect()
 }
 
-/// For each true contact, the tracked one that is paired with it; `None` for contacts that do not touch or were not detected.
+/// Tracked contact of each true one; `None` if untouched or undetected.
 pub fn tracked_of(track: &Track, truths: &[Contact]) -> Vec<Option<Tracked>> {
     let touching: Vec<usize> = (0..truths.len()).filter(|i| truths[*i].force_n > 0.0).collect();
     let places: Vec<Position> = touching.iter().map(|i| truths[*i].position).collect();
@@ -113,7 +109,6 @@ pub fn tracked_of(track: &Track, truths: &[Contact]) -> Vec<Option<Tracked>> {
     tracked
 }
 
-/// As many pairs of indices as the shorter list has, with the least sum of distances.
 fn pairs(a: &[Position], b: &[Position]) -> Vec<(usize, usize)> {
     if b.len() < a.len() {
         return pairs(b, a).into_iter().map(|(i, j)| (j, i)).collect();
@@ -123,7 +118,7 @@ fn pairs(a: &[Position], b: &[Position]) -> Vec<(usize, usize)> {
     best.1.into_iter().enumerate().collect()
 }
 
-/// Enumerates every assignment of distinct elements of `b` to those of `a`; `chosen` is the assignment so far.
+/// Searches all assignments; `chosen` is the current part.
 fn choose(a: &[Position], b: &[Position], chosen: &mut Vec<usize>, sum: f64, best: &mut (f64, Vec<usize>)) {
     if chosen.len() == a.len() {
         if sum < best.0 {
@@ -141,33 +136,33 @@ fn choose(a: &[Position], b: &[Position], chosen: &mut Vec<usize>, sum: f64, bes
     }
 }
 
-/// Tracks of a recording, by the filter and by the smoother.
+/// Tracks of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Followed {
-    /// Tracks by the filter, each from the readings up to its time.
+    /// Filtered tracks.
     pub filtered: Vec<Track>,
-    /// Tracks by the smoother, each from all readings.
+    /// Smoothed tracks.
     pub smoothed: Vec<Track>,
 }
 
-/// A recording that cannot be tracked.
+/// Tracking error.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FollowError {
-    /// The locator cannot track.
+    /// No likelihood.
     #[error(transparent)]
     NotTrackable(#[from] NotTrackable),
-    /// A row is out of order.
+    /// Times do not increase.
     #[error(transparent)]
     Track(#[from] TrackError),
-    /// The watch stopped the work.
+    /// Cancelled by the watch.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
 
-/// Tracks the contacts of a recording with rising times.
+/// Tracks the contacts of a recording.
 ///
 /// # Errors
-/// [`FollowError`] for a locator that has no likelihood, or a time that is not later than the one before.
+/// [`FollowError`].
 pub fn follow(
     locator: &Locator,
     config: TrackerConfig,
@@ -181,41 +176,40 @@ pub fn follow(
     Ok(Followed { smoothed: tracker.smoothed(Watch::NONE)?, filtered: tracker.filtered().to_vec() })
 }
 
-/// The errors at one speed.
+/// Errors at one speed.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct SpeedErrors {
-    /// Ratio of the speed between the turns to the critical speed.
+    /// Speed over the critical speed.
     pub ratio: f64,
-    /// Speed between the turns, in m/s.
+    /// Speed between turns, in m/s.
     pub speed_m_per_s: f64,
-    /// Errors of the filter.
+    /// Filter errors.
     pub filtered: TrackErrors,
-    /// Errors of the smoother.
+    /// Smoother errors.
     pub smoothed: TrackErrors,
 }
 
-/// Error of a sweep over speeds.
+/// Sweep error.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SweepError {
-    /// The locator cannot track.
+    /// Tracking error.
     #[error(transparent)]
     Follow(#[from] FollowError),
-    /// The bench cannot be simulated.
+    /// Simulation error.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
-    /// The surface does not vibrate.
+    /// No critical speed.
     #[error("a sweep over speeds needs a beam that swings; this surface is in balance at any speed")]
     NoCriticalSpeed,
 }
 
-/// Speeds of a sweep, over the critical one.
+/// Ratios to the critical speed.
 pub const SPEED_RATIOS: [f64; 8] = [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 0.95];
 
-/// The errors at each of [`SPEED_RATIOS`]: the contacts are simulated with that speed, and tracked. A speed at which no contact is tracked
-/// is omitted.
+/// Simulates and tracks at [`SPEED_RATIOS`], without speeds at which no contact is tracked.
 ///
 /// # Errors
-/// [`SweepError`] when the surface has no critical speed, or the locator cannot track.
+/// [`SweepError`].
 pub fn sweep_speeds(
     locator: &Locator,
     config: TrackerConfig,

@@ -1,4 +1,4 @@
-//! Drift of an untouched surface in the course of a recording: how much the untouched reading may have changed by the time of use.
+//! Drift of an untouched surface over a recording.
 
 use crate::locator_fault::LocatorFault;
 use crate::recording::Recording;
@@ -8,24 +8,24 @@ use palpate_mechanics::sensing::Layout;
 use palpate_numerics::{mean, normal_quantile};
 use serde::{Deserialize, Serialize};
 
-/// Drift of the untouched reading in the course of a recording.
+/// Drift of the untouched reading over a recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct UntouchedDrift {
-    /// Untouched reading of each channel in the last rest.
+    /// Reading of the last rest.
     pub last: Vec<f64>,
     /// Range of each channel's untouched readings.
     pub range: Vec<f64>,
-    /// Standard deviation of each channel's random walk after a second, in its unit; empty where the rows have no times.
+    /// Standard deviation of each random walk after 1 s.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub walk_per_root_s: Vec<f64>,
-    /// Time from the first rest to the last, in seconds, where the rows have times.
+    /// Time from the first to the last rest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub duration_s: Option<f64>,
 }
 
 impl UntouchedDrift {
-    /// The drift between the rests of a recording; `None` where noise explains their course, or the rests are too few.
+    /// Returns a drift beyond noise.
     pub fn of_recording(recording: &Recording) -> Option<Self> {
         let rests = recording.rests();
         if rests.len() < FEWEST_RESTS {
@@ -34,7 +34,7 @@ impl UntouchedDrift {
         let channels = recording.channels.len();
         let levels: Vec<Vec<f64>> = rests.iter().map(|rest| recording.mean_reading(rest)).collect();
         let course = |channel: usize| levels.iter().map(|level| level[channel]).collect::<Vec<f64>>();
-        // Level of each channel, so that the test of all channels has the level `SIGNIFICANCE`.
+        // Level of each channel for an overall level `SIGNIFICANCE`.
         let share = SIGNIFICANCE / channels as f64;
         if !(0..channels).any(|channel| is_drifting(&course(channel), share)) {
             return None;
@@ -58,8 +58,7 @@ impl UntouchedDrift {
         })
     }
 
-    /// Variance that the random walk of each channel has in the scatter of the rests: twice its mean square deviation w²·T/15 from a straight line over the time T.
-    /// Empty where the duration or the walk is not known.
+    /// Twice the mean square deviation w²·T/15 of each walk from a line over the duration T.
     pub fn walk_variances(&self) -> Vec<f64> {
         let of = |duration_s: f64| {
             self.walk_per_root_s.iter().map(|walk| 2.0 / 15.0 * walk * walk * duration_s).collect()
@@ -67,17 +66,16 @@ impl UntouchedDrift {
         self.duration_s.map_or_else(Vec::new, of)
     }
 
-    /// Largest change of each channel after the last rest that counts as more drift: the range of the recording. Disabled channels may change by any
-    /// amount.
+    /// Returns the largest change that counts as drift; infinite for disabled channels.
     pub fn reach(&self, layout: &Layout) -> Vec<f64> {
         let reach = |(range, dead): (&f64, bool)| if dead { f64::INFINITY } else { *range };
         self.range.iter().zip(layout.sensors().iter().map(|sensor| sensor.channel.dead)).map(reach).collect()
     }
 
-    /// Checks the values read from a file.
+    /// Checks values from a file.
     ///
     /// # Errors
-    /// [`LocatorFault`], naming what does not fit together.
+    /// [`LocatorFault`].
     pub fn check(&self, channels: usize) -> Result<(), LocatorFault> {
         LocatorFault::check_count("last untouched channels", channels, self.last.len())?;
         LocatorFault::check_count("ranges of untouched channels", channels, self.range.len())?;
@@ -102,10 +100,8 @@ impl UntouchedDrift {
     }
 }
 
-/// Whether values in the order of time drift; `share` is the probability of an error for independent values.
-///
-/// Von Neumann's ratio η = Σ(xᵢ₊₁ − xᵢ)²/Σ(xᵢ − x̄)² has the mean 2 for n independent normal values and the variance 4·(n − 2)/(n² − 1) (*Annals of Mathematical
-/// Statistics* 12, 1941). It is about normal, and small where they drift.
+/// Von Neumann's ratio η = Σ(xᵢ₊₁ − xᵢ)²/Σ(xᵢ − x̄)² is about normal for n independent values, with mean 2
+/// and variance 4·(n − 2)/(n² − 1), and small for drift (*Annals of Mathematical Statistics* 12, 1941).
 fn is_drifting(values: &[f64], share: f64) -> bool {
     let n = values.len() as f64;
     let average = mean(values.iter().copied());
@@ -115,10 +111,8 @@ fn is_drifting(values: &[f64], share: f64) -> bool {
     squares > 0.0 && steps < bound * squares
 }
 
-/// Standard deviation w of a random walk after a second, by values in the order of time; 0 where they show none.
-///
-/// For white noise of variance σ² on a walk, changes over k values have the mean square D_k = 2·σ² + w²·T_k, with T_k their mean duration.
-/// So two lags determine w² = (D_k − D₁)/(T_k − T₁). The longer lag is a quarter of the values, over which three changes do not overlap.
+/// With white noise σ², changes over k values have the mean square D_k = 2·σ² + w²·T_k, so w² = (D_k −
+/// D₁)/(T_k − T₁); k is a quarter of the values.
 fn walk_per_root_s(values: &[f64], times_s: &[f64]) -> f64 {
     let over = |lag: usize| {
         let changes = values.iter().zip(&values[lag..]).map(|(before, after)| (after - before).powi(2));
@@ -139,7 +133,6 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
-    /// Presses with two untouched rows after each. The noise is 1, and the second channel drifts by `drift` a press.
     fn recording(presses: usize, drift: f64, seed: u64) -> Recording {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut row = |force_n: f64, press: usize| {

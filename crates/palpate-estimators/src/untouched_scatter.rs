@@ -1,17 +1,15 @@
-//! Scatter of an untouched surface from one rest to the next: the residue that hysteresis, creep and drift leave after a touch, with the noise.
+//! Scatter of an untouched surface between rests: residue, drift and noise.
 //!
-//! Noise is learnt from repeats, and hardly includes the residue of a touch. The untouched rows of a recording show the residue, where
-//! presses lie between them. Each run of untouched rows is a rest. About a straight line in time, which removes a steady drift, the rests
-//! have the variance s² in each channel. A reading less a baseline, which is a rest too, has the variance 2·s².
+//! A rest is a run of untouched rows. About a line in time the rests have the variance s² in each channel,
+//! and a reading less a baseline has 2·s².
 //!
-//! Symbols: d reading less the untouched reading, n channels, ν degrees of freedom of the rests, R correlation matrix of the channels.
+//! Symbols: d reading less the untouched reading, n channels, ν degrees of freedom, R correlation matrix.
 //!
-//! T = Σ d²/(2·s²) is Σ λ·χ²₁ with the eigenvalues λ of R. With c₁ = n, c₂ = tr R² and c₃ = tr R³ it is about n − g·b + g·χ²_b with g =
-//! c₃/c₂ and b = c₂³/c₃², which has the first three moments of T (Imhof, *Biometrika* 48, 1961). So channels with correlated residues count
-//! as fewer. As s² is estimated, the critical value c of χ²_b becomes that of b·F with b and ν degrees of freedom, about ν·(e^(c/(ν + b/2 −
-//! 1)) − 1) (Bartlett, *Journal of the Royal Statistical Society B* 9, 1947). R is estimated from the sample, and its eigenvalues scatter
-//! more than those of the surface: with few rests of unrelated channels the test is conservative. Where the deviations have heavier tails
-//! than normal ones, the critical value is at least that of Student's t distribution (`tails.rs`).
+//! T = Σ d²/(2·s²) is Σ λ·χ²₁ with the eigenvalues λ of R. With c₁ = n, c₂ = tr R², c₃ = tr R³ it is about n
+//! − g·b + g·χ²_b, g = c₃/c₂, b = c₂³/c₃², of equal first three moments (Imhof, *Biometrika* 48, 1961). For
+//! the estimated s² the critical value c of χ²_b becomes that of b·F, about ν·(e^(c/(ν + b/2 − 1)) − 1)
+//! (Bartlett, *Journal of the Royal Statistical Society B* 9, 1947). Few rests make the test conservative.
+//! Heavy tails raise the value to that of Student's t (`tails.rs`).
 
 mod tails;
 
@@ -24,53 +22,46 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use tails::HeavyTails;
 
-/// Scatter of an untouched surface from one rest to the next; see [the module](self).
+/// Scatter between rests; see [the module](self).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct UntouchedScatter {
-    /// Untouched reading of each channel, the centre of the scatter.
+    /// Untouched reading of each channel.
     pub centre: Vec<f64>,
-    /// Standard deviation of each channel about it, from one rest to the next; 0 for a channel that never changes untouched, and for a
-    /// disabled one.
+    /// Standard deviation of each channel; 0 for a constant or disabled one.
     pub sd: Vec<f64>,
-    /// Critical value of Σ d²/sd² of an untouched surface at the false-alarm rate.
+    /// Critical value of Σ d²/sd² at the false-alarm rate.
     pub bound: f64,
 }
 
-/// Fewest rests that determine the untouched surface. With fewer, the critical value would be that of a t distribution with hardly any
-/// degrees of freedom.
+/// Fewer leave hardly any degrees of freedom.
 pub(crate) const FEWEST_RESTS: usize = 5;
 
-/// Deviations of rows from what is steady in them: of untouched rows from their slow course, or of repeats from their means.
+/// Deviations of untouched rows from their slow course, or of repeats from their means.
 pub(crate) struct Deviations {
-    /// Deviation of each row, with its weight: the share that the row has of its rest, or of the freedom of its repeats.
     rows: Vec<(Vec<f64>, f64)>,
     /// ν.
     freedom: f64,
-    /// Deviations of repeated presses from their means, where these scatter no more than the rests: noise of the same kind, in larger number.
+    /// Repeats that scatter no more than the rests.
     noise: Option<Box<Self>>,
 }
 
 impl Deviations {
-    /// Parameters of a line.
     const OF_LINE: usize = 2;
 
-    /// The rests of a recording; `None` where it has too few, or its rows have no order in time.
     pub fn of_rests(recording: &Recording) -> Option<Self> {
         let rests = Self::new(recording, &recording.rests())?;
         let noise = Self::of_repeats(&recording.touched()).filter(|noise| rests.scatter_as_much_as(noise));
         Some(Self { noise: noise.map(Box::new), ..rests })
     }
 
-    /// The untouched rows of a recording with too few rests, each as a rest of its own: their noise, without the residue of touches; `None`
-    /// for too few rows.
+    /// Single rows, without the residue of touches.
     pub fn of_single_rows(recording: &Recording) -> Option<Self> {
         let rows: Vec<Vec<usize>> = recording.rests().into_iter().flatten().map(|row| vec![row]).collect();
         Self::new(recording, &rows)
     }
 
-    /// The noise by repeats, for a recording with too few untouched rows: rows of one position and force, and untouched rows, about their
-    /// means. `None` for too few repeats.
+    /// Repeats and untouched rows about their means.
     pub fn of_repeats(recording: &Recording) -> Option<Self> {
         let rows = &recording.rows;
         let key = |row: &usize| {
@@ -117,8 +108,7 @@ impl Deviations {
         Some(Self { rows: deviations.collect(), freedom: (rests.len() - Self::OF_LINE) as f64, noise: None })
     }
 
-    /// True where normal noise of these standard deviations explains the deviations at the 5 % level: their mean square, in units of the noise, is about normal,
-    /// and they have no heavy tails.
+    /// True for normal noise at the 5 % level.
     pub fn are_noise(&self, noise_sd: &[Option<f64>]) -> bool {
         let channels: Vec<(usize, f64)> =
             noise_sd.iter().enumerate().filter_map(|(channel, sd)| Some((channel, (*sd)?))).collect();
@@ -130,9 +120,9 @@ impl Deviations {
             && self.heavy_tails(&channels.iter().map(|(channel, _)| *channel).collect::<Vec<_>>()).is_none()
     }
 
-    /// True where repeats scatter no more than the rests, in the mean over the channels, at the 5 % level. The test compares the median
-    /// absolute deviation, which hardly depends on the tails; for n normal values with the quartile q it has the relative variance
-    /// 1/(16·q²·φ(q)²·n) (Serfling, *Approximation Theorems of Mathematical Statistics*, 1980).
+    /// Compares median absolute deviations at the 5 % level; for n normal values of quartile q they have the
+    /// relative variance 1/(16·q²·φ(q)²·n) (Serfling, *Approximation Theorems of Mathematical Statistics*,
+    /// 1980).
     fn scatter_as_much_as(&self, repeats: &Self) -> bool {
         let quartile = normal_quantile(0.75);
         let density = (-0.5 * quartile * quartile).exp() / TAU.sqrt();
@@ -148,8 +138,6 @@ impl Deviations {
         mean(ratios) <= 1.0 + normal_quantile(1.0 - SIGNIFICANCE) * variance.sqrt()
     }
 
-    /// Tails of the noise in some channels, which repeated presses show best, and the largest share that it has of a channel's variance; `None` where they are
-    /// those of normal noise.
     fn heavy_tails(&self, channels: &[usize]) -> Option<(HeavyTails, f64)> {
         let noise = self.noise.as_deref().unwrap_or(self);
         let standardized: Vec<(f64, f64)> = channels
@@ -163,12 +151,10 @@ impl Deviations {
         Some((HeavyTails::of_deviations(&standardized)?, share))
     }
 
-    /// Covariance of two channels.
     fn product(&self, a: usize, b: usize) -> f64 {
         self.rows.iter().map(|(row, share)| share * row[a] * row[b]).sum::<f64>() / self.freedom
     }
 
-    /// Scatter of the rests about `centre`, for the channels that are not disabled.
     pub fn scatter(&self, centre: Vec<f64>, layout: &Layout, rate: FalseAlarmRate) -> UntouchedScatter {
         let is_live = |c: usize| !layout.sensors()[c].channel.dead;
         let variances: Vec<f64> =
@@ -186,7 +172,6 @@ impl Deviations {
     }
 }
 
-/// Critical value of Σ d²/(2·s²) for channels of a correlation matrix, with variances that were estimated with `freedom` degrees of freedom.
 fn critical_value(correlations: &[Vec<f64>], freedom: f64, rate: FalseAlarmRate) -> f64 {
     let n = correlations.len();
     if n == 0 {
@@ -208,7 +193,6 @@ fn critical_value(correlations: &[Vec<f64>], freedom: f64, rate: FalseAlarmRate)
     n as f64 - scale * effective + scale * freedom * (exponent.exp() - 1.0)
 }
 
-/// Level and slope of the straight line through values at some times by least squares; slope 0 where all times are equal.
 fn line(times_s: &[f64], values: &[f64]) -> [f64; 2] {
     let (time_s, value) = (mean(times_s.iter().copied()), mean(values.iter().copied()));
     let products = times_s.iter().zip(values).map(|(t, y)| (t - time_s) * (y - value));
@@ -218,23 +202,23 @@ fn line(times_s: &[f64], values: &[f64]) -> [f64; 2] {
 }
 
 impl UntouchedScatter {
-    /// Disables a channel. The bound stays that of all channels, by which fewer readings are contacts.
+    /// Disables a channel; the bound stays.
     pub fn disable(&mut self, channel: usize) {
         if let Some(sd) = self.sd.get_mut(channel) {
             *sd = 0.0;
         }
     }
 
-    /// True for a reading of an untouched surface, at the false-alarm rate. Channels of standard deviation 0 are not used.
+    /// True for an untouched reading at the false-alarm rate.
     pub fn contains(&self, reading: &[f64]) -> bool {
         let channels = reading.iter().zip(&self.centre).zip(&self.sd).filter(|(_, sd)| **sd > 0.0);
         channels.map(|((value, centre), sd)| ((value - centre) / sd).powi(2)).sum::<f64>() <= self.bound
     }
 
-    /// Checks the values read from a file.
+    /// Checks values from a file.
     ///
     /// # Errors
-    /// [`LocatorFault`], naming what does not fit together.
+    /// [`LocatorFault`].
     pub fn check(&self, channels: usize) -> Result<(), LocatorFault> {
         LocatorFault::check_count("untouched channels", channels, self.centre.len())?;
         LocatorFault::check_count("scatters of untouched channels", channels, self.sd.len())?;

@@ -1,4 +1,4 @@
-//! Files that are written whole: first under a temporary name, so readers never see an incomplete file.
+//! Files that replace old ones atomically.
 #![forbid(unsafe_code)]
 
 use std::fs::File;
@@ -6,10 +6,10 @@ use std::io::{Error, Result, Write};
 use std::path::{Path, PathBuf};
 use tempfile::{Builder, NamedTempFile};
 
-/// Writes a file that is completely on the disk when this returns. A link is kept, and its target is written. A replaced file keeps its mode.
+/// Writes a file to the disk, through links and with the old mode.
 ///
 /// # Errors
-/// The folder is not writable, or the disk is full; the old file then remains.
+/// The folder is not writable, or the disk is full; the old file remains.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     write_with(path, |file| file.write_all(bytes))
 }
@@ -17,7 +17,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
 /// Writes a file as [`write()`] does; `fill` writes its content.
 ///
 /// # Errors
-/// As for [`write()`], and the errors of `fill`.
+/// As for [`write()`], and those of `fill`.
 pub fn write_with(path: &Path, fill: impl FnOnce(&mut File) -> Result<()>) -> Result<()> {
     let place = place(path)?;
     let mut file = temporary(folder_of(&place))?;
@@ -30,12 +30,11 @@ pub fn write_with(path: &Path, fill: impl FnOnce(&mut File) -> Result<()>) -> Re
     Ok(())
 }
 
-/// Path of a file, which need not exist, with all links followed.
+/// Follows all links of a path, which need not exist.
 ///
 /// # Errors
-/// Links that lead in a circle.
+/// Circular links.
 pub fn place(path: &Path) -> Result<PathBuf> {
-    /// Most links that are followed, as in Linux.
     const MOST: usize = 40;
     let mut place = path.to_owned();
     for _ in 0..MOST {
@@ -47,7 +46,7 @@ pub fn place(path: &Path) -> Result<PathBuf> {
     Err(Error::other("its links lead in a circle"))
 }
 
-/// A temporary file in a folder, which also proves that the folder is writable. The file is removed when it is dropped.
+/// Creates a temporary file, which is removed on drop.
 ///
 /// # Errors
 /// The folder is not writable.
@@ -60,7 +59,7 @@ pub fn temporary(folder: &Path) -> Result<NamedTempFile> {
     builder.tempfile_in(folder)
 }
 
-/// The folder of a file.
+/// Returns the folder of a file.
 pub fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

@@ -1,21 +1,17 @@
-//! A host and a port.
+//! Network addresses.
 
 use std::fmt;
 
 /// A host and a port.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Address {
-    /// Name or address of the host; an address of IPv6 without brackets.
+    /// Name or address; IPv6 without brackets.
     pub host: String,
-    /// The port, from 1.
+    /// Port, from 1.
     pub port: u16,
 }
 
 impl Address {
-    /// Parses `host:port`. The port is required unless a default is given, and the host is required if an example is given.
-    ///
-    /// # Errors
-    /// The problem, in words.
     pub(crate) fn read(text: &str, port: Option<u16>, example: Option<&str>) -> Result<Self, String> {
         let ends = text.rfind(']').map_or(0, |end| end + 1);
         let (host, given) = match text[ends..].rfind(':') {

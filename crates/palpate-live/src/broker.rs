@@ -1,13 +1,12 @@
-//! Address of an MQTT broker with the login, and messages for connection errors.
+//! Address and login of an MQTT broker.
 
 use crate::address::Address;
 use crate::login::{Login, PASSWORD_VARIABLE};
 use rumqttc::{ConnectReturnCode, ConnectionError};
 
-/// Default port of MQTT.
 const MQTT_PORT: u16 = 1883;
 
-/// Parses `user:password@host:port` before the topic of a broker; only the host is required.
+/// Parses `user:password@host:port`.
 pub fn broker_and_login(
     text: &str,
     topic: &str,
@@ -30,7 +29,7 @@ pub fn broker_and_login(
     Ok((Address::read(broker, Some(MQTT_PORT), example)?, Some(login)))
 }
 
-/// Message for the failure of a connection to a broker.
+/// Returns the message for a failed connection.
 pub fn explain(broker: &str, error: &ConnectionError) -> String {
     match error {
         ConnectionError::ConnectionRefused(

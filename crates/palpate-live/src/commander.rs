@@ -1,52 +1,47 @@
-//! The way back to a device.
+//! Commands to a device.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
-/// Most commands that wait for a device.
 const COMMANDS: usize = 16;
 
-/// Error for a command that cannot be sent to a device.
+/// Error of an unsent command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SendError {
-    /// The source has no way back.
+    /// The source takes no commands.
     #[error("the source takes no commands; serial ports, TCP and MQTT with a topic without `+` and `#` do")]
     OneWay,
-    /// The device is away.
+    /// The device is disconnected.
     #[error("the device is not there; the command was not sent")]
     Away,
-    /// The device takes commands too slowly.
+    /// Too many commands wait.
     #[error("{COMMANDS} commands wait for the device already; the command was not sent")]
     Full,
 }
 
-/// The way back to the device of a source. Clones share their state.
+/// Sender of commands to a device; clones share their state.
 #[derive(Clone, Debug)]
 pub struct Commander {
     commands: SyncSender<Vec<u8>>,
-    /// True while the device is connected.
     open: Arc<AtomicBool>,
-    /// End of a line of text; empty for links where a message is a line.
     line_end: &'static str,
 }
 
 impl Commander {
-    /// A way back to a device that is connected while `open` is true, and the receiver of the commands for it.
     pub(crate) fn new(open: Arc<AtomicBool>) -> (Self, Receiver<Vec<u8>>) {
         let (commands, for_device) = sync_channel(COMMANDS);
         (Self { commands, open, line_end: "" }, for_device)
     }
 
-    /// Sets the end of lines to the device.
     pub(crate) fn with_line_end(self, line_end: &'static str) -> Self {
         Self { line_end, ..self }
     }
 
-    /// Sends a command to the device unchanged. Returns at once; the thread of the source sends it.
+    /// Queues a command without waiting.
     ///
     /// # Errors
-    /// [`SendError`] if the device is away, or too many commands wait for it.
+    /// The device is disconnected, or too many commands wait.
     pub fn send(&self, command: &[u8]) -> Result<(), SendError> {
         if !self.open.load(Ordering::Relaxed) {
             return Err(SendError::Away);
@@ -57,7 +52,7 @@ impl Commander {
         })
     }
 
-    /// Sends a line of text; with a line end on a stream, without one as a message.
+    /// Queues a line of text.
     ///
     /// # Errors
     /// As for [`Commander::send`].

@@ -1,60 +1,55 @@
-//! Synchronization of a board's clock with the host's.
+//! Synchronization of the clock of a board with that of the host.
 //!
-//! A reading arrives after it was taken: arrival − device time = offset of the clocks + delay, and the delay has a minimum. So the offset, including
-//! the least delay, is the lower envelope of arrival − device time over device time. The slope of the envelope is the drift of one clock against the
-//! other. The envelope is the line below all points with the least mean distance from them. This line is the edge of their lower convex hull
-//! over their mean device time (Zhang, Liu, Xia, "Clock synchronization algorithms for network measurements", INFOCOM 2002). It follows a changing
-//! drift, because it is fitted to the last [`WINDOW_S`] only.
+//! Arrival − device time is the offset of the clocks plus a delay with a minimum. The lower envelope of this
+//! difference over device time gives the offset with the least delay, and the drift as slope. The envelope is
+//! the edge of the lower convex hull over the mean device time (Zhang, Liu, Xia, "Clock synchronization
+//! algorithms for network measurements", INFOCOM 2002).
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Window of device time for the fit of the envelope, in seconds.
+/// Window of the fit, in seconds.
 pub const WINDOW_S: f64 = 30.0;
-/// Longest bin of device time, in seconds, and as a ratio of the time since the first reading. Only the lowest and the highest point of a bin are kept.
-/// The ratio makes the first bins short, so a drift of some percent shows from the first readings on.
+/// Longest bin, in seconds and relative to the elapsed time; short first bins show a drift of some percent at
+/// once.
 const BIN_S: f64 = 0.25;
 const BIN_RATIO: f64 = 1.0 / 16.0;
-/// Greatest drift of a clock, as a ratio: three times that of an uncalibrated oscillator of a microcontroller.
+/// Greatest drift as a ratio: three times that of an uncalibrated oscillator of a microcontroller.
 const GREATEST_DRIFT: f64 = 0.03;
-/// Times at which 32-bit clocks wrap around: those in microseconds and those in milliseconds.
+/// Ranges of 32-bit clocks in µs and ms.
 const WRAPS: [Duration; 2] = [Duration::from_micros(1 << 32), Duration::from_millis(1 << 32)];
-/// Largest difference between a step of the board's clock and one of the host's, in seconds, in addition to [`GREATEST_DRIFT`]. A larger one means
-/// that the clock was set.
+/// Largest difference between steps in seconds, beyond [`GREATEST_DRIFT`], of clocks that were not set.
 const STEP_S: f64 = 2.0;
 
-/// Time from one reading to the next by the board's clock alone, which may wrap around; `None` for a clock that was set back.
+/// Returns the time between readings, with a wrap-around; `None` for a clock that was set back.
 pub fn step(from: Duration, to: Duration) -> Option<Duration> {
-    /// A step back from the last 1/END of the clock's range to the first 1/END is a wrap-around.
     const END: u32 = 16;
     let around = |wrap: &Duration| from < *wrap && *wrap - from < *wrap / END && to < *wrap / END;
     let wrapped = || WRAPS.iter().find(|wrap| around(wrap)).map(|wrap| *wrap - from + to);
     to.checked_sub(from).or_else(wrapped)
 }
 
-/// Map from a board's clock to the host's, estimated from the arrivals of readings.
+/// Map from the board's clock to the host's.
 #[derive(Debug, Default)]
 pub struct DeviceClock {
     epoch: Option<Epoch>,
 }
 
-/// Period in which the board's clock is not set.
+/// Period between two settings of the clock.
 #[derive(Debug)]
 struct Epoch {
-    /// Device and host time of the first reading, the origins of the relative times.
     first_device: Duration,
     first_host: Duration,
     last_device: Duration,
     last_host: Duration,
-    /// Sum of the wrap-arounds of the clock.
     wrapped: Duration,
     bins: VecDeque<Bin>,
     line: Line,
-    /// Greatest distance of an offset from the line, in seconds.
+    /// Greatest distance of a point above the line.
     spread_s: f64,
 }
 
-/// Offset of the host's clock, `offset_s + slope · device_s`, in seconds.
+/// `offset_s + slope · device_s`.
 #[derive(Clone, Copy, Debug)]
 struct Line {
     offset_s: f64,
@@ -67,14 +62,12 @@ impl Line {
     }
 }
 
-/// Device time and offset of a reading, in seconds since the first.
 #[derive(Clone, Copy, Debug)]
 struct Point {
     device_s: f64,
     offset_s: f64,
 }
 
-/// Lowest and highest point of an interval of device time.
 #[derive(Clone, Copy, Debug)]
 struct Bin {
     start_s: f64,
@@ -83,8 +76,7 @@ struct Bin {
 }
 
 impl DeviceClock {
-    /// Host time at which a reading was taken, which is never after its arrival. Device and host time have independent origins. After the clock was
-    /// set, as by a reset of the board, the estimation restarts.
+    /// Returns the host time of a reading, at most its arrival. A clock that was set restarts the estimation.
     pub fn host_time(&mut self, device: Duration, arrival: Duration) -> Duration {
         if !self.epoch.as_mut().is_some_and(|epoch| epoch.step(device, arrival)) {
             self.epoch = Some(Epoch::new(device, arrival));
@@ -92,7 +84,7 @@ impl DeviceClock {
         self.epoch.as_mut().map_or(arrival, |epoch| epoch.host_time(device, arrival))
     }
 
-    /// Seconds by which the host's clock gains on the board's per second of the board's clock; `None` before the second reading.
+    /// Gain of the host's clock per second of the board's.
     pub fn drift(&self) -> Option<f64> {
         self.epoch.as_ref().map(|epoch| epoch.line.slope).filter(|slope| *slope != 0.0)
     }
@@ -112,7 +104,7 @@ impl Epoch {
         }
     }
 
-    /// Advances to the next reading. The host's clock gives the number of wrap-arounds. False for a clock that was set.
+    /// Advances to a reading; false for a clock that was set.
     fn step(&mut self, device: Duration, arrival: Duration) -> bool {
         let host_s = arrival.as_secs_f64() - self.last_host.as_secs_f64();
         let device_s = device.as_secs_f64() - self.last_device.as_secs_f64();
@@ -143,7 +135,7 @@ impl Epoch {
         let host_s = since_first_s(arrival, self.first_host);
         let point = Point { device_s, offset_s: host_s - device_s };
         self.add(point);
-        // The time is not after the arrival, and not before it by more than the largest delay so far.
+        // The delay is at least 0 and at most the largest one so far.
         let above_s = (point.offset_s - self.line.offset_at(device_s)).clamp(0.0, self.spread_s);
         arrival.saturating_sub(Duration::from_secs_f64(above_s))
     }
@@ -183,7 +175,6 @@ impl Epoch {
     }
 }
 
-/// The line below all points with the least mean distance from them.
 fn envelope(bins: &VecDeque<Bin>) -> Line {
     let lowest = |slope: f64| {
         let offsets = bins.iter().map(|bin| bin.low.offset_s - slope * bin.low.device_s);
@@ -197,7 +188,6 @@ fn envelope(bins: &VecDeque<Bin>) -> Line {
     lowest(slope.clamp(-GREATEST_DRIFT, GREATEST_DRIFT))
 }
 
-/// Lower convex hull of points in ascending order of device time.
 fn lower_hull(points: impl Iterator<Item = Point>) -> Vec<Point> {
     let mut hull: Vec<Point> = Vec::new();
     for point in points {
@@ -221,7 +211,6 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
-    /// A board with a clock that drifts against the host's, and a line with a jittering delay.
     struct Bench {
         rng: Xoshiro256PlusPlus,
         drift: f64,
@@ -234,7 +223,7 @@ mod tests {
             Self { rng: Xoshiro256PlusPlus::seed_from_u64(seed), drift, jitter_s, start_s }
         }
 
-        /// Device time and arrival of the reading that is taken at a host time; the least delay is 0.
+        /// Device time and arrival.
         fn read(&mut self, taken_s: f64) -> (Duration, Duration) {
             let device_us = (self.start_s + taken_s * (1.0 - self.drift)) * 1e6;
             let arrival_s = taken_s + self.rng.random_range(0.0..self.jitter_s);
@@ -243,7 +232,6 @@ mod tests {
         }
     }
 
-    /// Errors of the mapped time of readings at `rate_hz`, in seconds.
     fn errors_s(
         bench: &mut Bench,
         clock: &mut DeviceClock,
@@ -262,7 +250,6 @@ mod tests {
             .collect()
     }
 
-    /// Resolution of the board's clock, in seconds.
     const TICK_S: f64 = 1e-6;
 
     proptest! {
@@ -281,7 +268,7 @@ mod tests {
             let errors = errors_s(&mut bench, &mut clock, 10.0, 40.0, rate_hz);
             let greatest = errors.iter().map(|error| error.abs()).fold(0.0, f64::max);
             prop_assert!(greatest < jitter_s + TICK_S, "{greatest} of {jitter_s}");
-            // Once the drift is known, the errors are far below the jitter.
+            // With an estimated drift the errors are far below the jitter.
             let mut last = errors[errors.len() / 2..].to_vec();
             last.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
             let median = last[last.len() / 2].abs();
@@ -344,7 +331,7 @@ mod tests {
     fn a_clock_of_another_unit_than_said_leaves_arrivals_as_they_are() {
         let mut clock = DeviceClock::default();
         for i in 0..1000_u64 {
-            // Milliseconds are mistaken for seconds: 10 s each.
+            // Milliseconds are interpreted as seconds: 10 s each.
             let arrival = Duration::from_millis(10 * i);
             assert_eq!(clock.host_time(Duration::from_secs(10 * i), arrival), arrival);
         }

@@ -8,7 +8,7 @@ use serde::Serialize;
 pub struct EventRecord {
     /// Seconds since 1970-01-01 00:00 UTC.
     pub time_s: f64,
-    /// The event itself.
+    /// The event.
     #[serde(flatten)]
     pub event: Event,
 }
@@ -22,7 +22,7 @@ pub enum Event {
         /// Name.
         name: String,
     },
-    /// The source went away, and is tried again.
+    /// The source was lost; reconnection continues.
     SourceLost {
         /// Cause.
         why: String,
@@ -33,13 +33,13 @@ pub enum Event {
     Gap {
         /// Seconds without a reading.
         seconds: f64,
-        /// Frames that the board sent in the meantime, if it counts them.
+        /// Lost frames, if the board counts them.
         #[serde(skip_serializing_if = "Option::is_none")]
         lost_frames: Option<u32>,
     },
     /// The wall clock was set.
     ClockSet {
-        /// Change in seconds, forward where positive.
+        /// Change in seconds.
         by_s: f64,
     },
     /// A contact began.
@@ -48,7 +48,7 @@ pub enum Event {
         #[serde(flatten)]
         contact: ContactRecord,
     },
-    /// A contact has moved by more than its uncertainty.
+    /// A contact moved by more than its uncertainty.
     Move {
         /// Position and force.
         #[serde(flatten)]
@@ -56,27 +56,27 @@ pub enum Event {
     },
     /// The contact has ended.
     LiftOff {
-        /// Duration of the contact in seconds.
+        /// Duration in seconds.
         seconds: f64,
     },
-    /// A second contact began, or a reading that cannot be distinguished from one.
+    /// A reading that no single contact explains.
     OutsideModel,
-    /// Contacts beside the first.
+    /// A second contact.
     SecondContact {
         /// Position and force.
         #[serde(flatten)]
         contact: ContactRecord,
     },
-    /// The state of a channel has changed.
+    /// A channel changed its state.
     Channel {
         /// Name.
         name: String,
-        /// State now.
+        /// New state.
         state: ChannelState,
     },
-    /// The baseline was set by a tare.
+    /// A tare has set the baseline.
     Tared,
-    /// A recording, a broker or another part beside the session has failed, or works again.
+    /// An output has failed, or works again.
     Trouble {
         /// Problem and cause.
         text: String,
@@ -96,7 +96,7 @@ pub enum Event {
 }
 
 impl Event {
-    /// Name of the event in records.
+    /// Name in records.
     pub const fn name(&self) -> &'static str {
         match self {
             Self::SourceOpened { .. } => "source_opened",
@@ -122,11 +122,11 @@ impl Event {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ChannelState {
-    /// The channel works.
+    /// Works.
     #[default]
     Well,
-    /// The channel repeats one value while others change.
+    /// Repeats one value while others change.
     Dead,
-    /// The channel reads the end of its range.
+    /// Reads the end of its range.
     Saturated,
 }

@@ -1,4 +1,4 @@
-//! Monitoring of the feed of a session or a calibration: detects a source without readings, and reports the cause.
+//! Detection of a source without readings.
 
 use crate::frame::{FrameReader, quote};
 use crate::input::Arrival;
@@ -7,50 +7,41 @@ use std::time::Duration;
 /// Message about a source that repeats readings.
 pub const REPEATED_READINGS: &str =
     "the board repeats readings: it sends faster than its sensors measure; each reading counts once";
-/// Consecutive bad frames, and time since the last reading, after which they are reported. Fewer are tolerated: a starting board prints some lines for
-/// people first, and a serial line occasionally tears a frame.
+/// Consecutive bad frames, and time without readings, that are reported: starting boards print text, and
+/// serial lines tear frames.
 const FRAMES: u64 = 5;
 const FRAMES_FOR: Duration = Duration::from_secs(1);
-/// Consecutive bad frames that are reported after any time, because a stream may have any pace.
+/// Reported after any time, because a stream may have any rate.
 const MANY_FRAMES: u64 = 100;
-/// Silence that is reported: longer than the start of a board after the reset by the opening of its port.
+/// Reported silence, longer than the start of a board.
 const SILENCE: Duration = Duration::from_secs(3);
-/// Shortest silence that is reported, in periods of the readings.
 const PERIODS: u32 = 5;
 
 /// Monitor of a feed of readings.
 #[derive(Debug, Default)]
 pub struct FeedWatch {
     state: FeedState,
-    /// Instant of the last reading or, before the first, of the opening.
     since: Duration,
-    /// Instant of the last reading, and time between the last two arrivals with readings.
     last_reading: Option<Duration>,
     period: Duration,
-    /// Number of readings at the last arrival.
     readings: u64,
-    /// Bytes since the last reading, or the opening.
     bytes: u64,
-    /// True for messages, which a board may send only when a value changes.
+    /// A board may send messages only when a value changes.
     has_messages: bool,
     is_reported: bool,
 }
 
-/// State of a source.
 #[derive(Debug, Default, PartialEq, Eq)]
 enum FeedState {
-    /// Not opened yet.
     #[default]
     Away,
     Open,
-    /// Ended by itself.
     Ended,
-    /// Lost, with the cause.
     Lost(String),
 }
 
 impl FeedWatch {
-    /// Takes an arrival that was read into `frames` and processed by `now`. Processing time does not count as silence.
+    /// Adds an arrival that was processed by `now`.
     pub fn receive(&mut self, arrival: &Arrival, now: Duration, frames: &FrameReader) {
         match arrival {
             Arrival::Opened(_) | Arrival::Joined(_) | Arrival::Piped(_) => {
@@ -74,7 +65,7 @@ impl FeedWatch {
         }
     }
 
-    /// Report of missing readings, once per period without readings; `None` otherwise.
+    /// Returns a report of missing readings, once per gap.
     pub fn report(&mut self, now: Duration, frames: &FrameReader) -> Option<String> {
         let since = now.saturating_sub(self.since);
         let bad = frames.bad_in_a_row();
@@ -89,7 +80,7 @@ impl FeedWatch {
         Some(format!("no readings: {}", self.reason(frames)))
     }
 
-    /// Fault of a feed that ends now: no reading at all, or none towards its end. `None` for a feed with readings up to its end.
+    /// Returns the fault of a feed without readings at its end.
     pub fn fault(&self, frames: &FrameReader) -> Option<String> {
         let is_cut_short = match &self.state {
             FeedState::Lost(_) => true,
@@ -106,7 +97,6 @@ impl FeedWatch {
         }
     }
 
-    /// Cause of the lack of readings, and its remedy.
     fn reason(&self, frames: &FrameReader) -> String {
         match &self.state {
             FeedState::Lost(why) => return why.clone(),

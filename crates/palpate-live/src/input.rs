@@ -1,37 +1,36 @@
-//! Inputs of a session, from sources and users.
+//! Inputs of a session.
 
 use crate::stamp::Stamp;
 
-/// Input of a session's thread.
+/// Input of a session.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Input {
-    /// An arrival of a source.
+    /// An arrival.
     Arrived(Arrived),
-    /// A command of a user.
+    /// A command.
     Command(Command),
-    /// The session is to end.
+    /// End of the session.
     Stop,
 }
 
 /// Arrival of a source.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Arrival {
-    /// The device with this name was opened, and its bytes begin with a frame.
+    /// Opened device, at the start of a frame.
     Opened(String),
-    /// The device with this name was opened while it sends: its bytes may begin amid a frame.
+    /// Opened device, amid a frame.
     Joined(String),
-    /// The stream with this name was opened, and comes at any pace, as through a pipe. The readings have the times of the board's clock, if the frames
-    /// contain them.
+    /// Opened stream of any rate, with the times of the board's clock.
     Piped(String),
-    /// Bytes of a stream that waited before it was opened: old readings.
+    /// Outdated bytes from before the opening.
     Backlog(Vec<u8>),
-    /// Bytes of a stream, in order, split at any place.
+    /// Bytes of a stream.
     Bytes(Vec<u8>),
-    /// Bytes of a message, as from UDP and MQTT: whole frames.
+    /// Whole frames, as from UDP and MQTT.
     Message(Vec<u8>),
-    /// The device went away, with the cause, and is tried again.
+    /// Lost device with the cause.
     Lost(String),
-    /// The source has ended.
+    /// End of the source.
     Ended,
 }
 
@@ -40,18 +39,18 @@ pub enum Arrival {
 pub struct Arrived {
     /// Instant of the last byte.
     pub at: Stamp,
-    /// Kind of the arrival, with its bytes.
+    /// The arrival.
     pub arrival: Arrival,
 }
 
 /// Command of a user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Command {
-    /// Tare: the next readings are untouched.
+    /// Tare with the next readings.
     Tare,
     /// Set a mark.
     Mark(String),
-    /// Report that a part beside the session has failed, or works again.
+    /// Report a failure or recovery of an output.
     Trouble(String),
     /// Raise an alarm.
     Alarm {

@@ -1,7 +1,7 @@
-//! Live use of palpate: turns the bytes of a board into contacts.
+//! Live contact localization.
 //!
-//! A [`source`] brings bytes, each with the instant of its arrival. A [`session`] turns them into readings, estimates and events. The session uses no
-//! device, file or clock. Therefore the same bytes at the same instants give the same results in a test, in a replay or on the bench.
+//! A [`source`] delivers bytes with arrival times; a [`session`] computes readings, estimates and events,
+//! reproducibly without device, file or clock.
 
 mod address;
 mod broker;

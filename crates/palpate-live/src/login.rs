@@ -1,19 +1,18 @@
-//! Login at a broker: user name and password. Messages never show the password.
+//! Login at a broker.
 
 use std::fmt::{self, Write};
 use std::path::PathBuf;
 
-/// Environment variable of the password, for URLs that contain a user and neither a password nor a file.
+/// Environment variable of the password.
 pub const PASSWORD_VARIABLE: &str = "PALPATE_MQTT_PASSWORD";
 
-/// User name and password of a URL. Neither `Display` nor `Debug` shows the password.
+/// User and password, which `Display` and `Debug` omit.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Login {
     user: String,
     password: Password,
 }
 
-/// Place of a password.
 #[derive(Clone, PartialEq, Eq)]
 enum Password {
     Given(String),
@@ -21,13 +20,13 @@ enum Password {
     Environment,
 }
 
-/// A login that cannot be used.
+/// Error of a login.
 #[derive(Debug, thiserror::Error)]
 pub enum LoginError {
-    /// The file of the password cannot be read.
+    /// The password file cannot be read.
     #[error("cannot read the password in {path}: {error}")]
     File {
-        /// The file.
+        /// File.
         path: String,
         /// Cause.
         error: std::io::Error,
@@ -35,7 +34,7 @@ pub enum LoginError {
 }
 
 impl Login {
-    /// Parses the percent-encoded `user` or `user:password` before the `@` of a URL. The password may instead be in a file.
+    /// Parses a percent-encoded `user` or `user:password`.
     ///
     /// # Errors
     /// The problem, without the password.
@@ -59,10 +58,10 @@ impl Login {
         Ok(Self { user, password })
     }
 
-    /// User name and password; the password is empty if the environment variable is not set.
+    /// Returns user and password; an unset environment variable gives an empty password.
     ///
     /// # Errors
-    /// [`LoginError`] for a file that cannot be read.
+    /// An unreadable file.
     pub fn credentials(&self) -> Result<(String, String), LoginError> {
         let password = match &self.password {
             Password::Given(password) => password.clone(),
@@ -76,7 +75,7 @@ impl Login {
         Ok((self.user.clone(), password))
     }
 
-    /// File of the password, if the URL contains one.
+    /// Password file.
     pub fn file(&self) -> Option<String> {
         match &self.password {
             Password::File(path) => Some(path.display().to_string()),
@@ -85,7 +84,7 @@ impl Login {
     }
 }
 
-/// The user name, percent-encoded as in a URL.
+/// The percent-encoded user name.
 impl fmt::Display for Login {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.user.bytes().try_for_each(|byte| match byte {
@@ -101,7 +100,6 @@ impl fmt::Debug for Login {
     }
 }
 
-/// Decodes percent-encoded text such as `%40`; `None` for a `%` without two hexadecimal digits, or bytes that are not UTF-8.
 fn decoded(text: &str) -> Option<String> {
     let mut bytes = Vec::new();
     let mut rest = text.bytes();
@@ -118,7 +116,7 @@ fn decoded(text: &str) -> Option<String> {
     String::from_utf8(bytes).ok()
 }
 
-/// Replaces the passwords of URLs in a message: `mqtt://user:secret@host` becomes `mqtt://user:***@host`.
+/// Hides the passwords of URLs: `mqtt://user:***@host`.
 pub fn without_passwords(message: &str) -> String {
     let mut shown = String::new();
     let mut rest = message;

@@ -1,4 +1,4 @@
-//! Monitor of a board without a rig: its last lines, the values in them, and their rate.
+//! Monitor of a board without a rig.
 
 use crate::frame::{BadFrame, Channel, Decoder, Frame, is_reserved, quote};
 use crate::input::{Arrival, Arrived};
@@ -7,38 +7,33 @@ use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-/// Lines that are kept.
 const LINES: usize = 100;
-/// Most characters of a line that is kept.
 const LONGEST: usize = 160;
-/// Most bytes without the end of a line; more are not text, or the baud rate is wrong.
+/// More bytes are not text, or the baud rate is wrong.
 const MOST_PARTIAL: usize = 4096;
-/// Most channels that are looked for.
 const MOST_CHANNELS: usize = 64;
-/// Time over which the rate is taken.
 const RATE_OVER: Duration = Duration::from_secs(2);
-/// Frames in a row that the channels do not explain, before channels are looked for again.
+/// Consecutive bad frames that restart the detection.
 const UNEXPLAINED: u32 = 20;
-/// Bytes that are searched for binary frames.
 const BINARY_SAMPLE: usize = 2048;
-/// Binary frames with a right checksum that decide how many channels there are.
+/// Valid checksums that establish the number of channels.
 const BINARY_FRAMES: usize = 3;
 
-/// A line as it came.
+/// A received line.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RawLine {
     /// Seconds since 1970-01-01 00:00 UTC.
     pub time_s: f64,
-    /// Its text; bytes that are not text are escaped, and long lines are cut.
+    /// Text, escaped and cut.
     pub text: String,
-    /// True where it is a reading of the channels that were found.
+    /// True for a reading.
     pub reads: bool,
 }
 
 /// Values of a channel.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChannelValues {
-    /// Name by which the board calls it; `s1`, `s2`, … where it has none.
+    /// Name in the frames, or `s1`, `s2`, …
     pub name: String,
     /// Newest value.
     pub now: Option<f64>,
@@ -46,26 +41,26 @@ pub struct ChannelValues {
     pub range: Option<[f64; 2]>,
 }
 
-/// State of a monitor as a record of JSON.
+/// State of a monitor for JSON.
 #[derive(Clone, Debug, Serialize)]
 pub struct MonitorRecord {
-    /// Name of the source, while it is there.
+    /// Name of the connected source.
     pub source: Option<String>,
-    /// Why there are no readings, in words.
+    /// Cause of missing readings.
     pub problem: Option<String>,
-    /// Bytes so far.
+    /// Number of bytes.
     pub bytes: u64,
-    /// Readings so far.
+    /// Number of readings.
     pub readings: u64,
-    /// Readings a second.
+    /// Readings per second.
     pub rate_hz: f64,
-    /// Frames that are not readings, by cause.
+    /// Bad frames by cause.
     pub bad_frames: BTreeMap<BadFrame, u64>,
-    /// The channels, once they were found.
+    /// Detected channels.
     pub channels: Vec<ChannelValues>,
-    /// True where the board names its values.
+    /// True if the board names its values.
     pub named: bool,
-    /// The last lines, the oldest first.
+    /// Last lines, oldest first.
     pub lines: Vec<RawLine>,
 }
 
@@ -78,9 +73,7 @@ pub struct Monitor {
     partial: Vec<u8>,
     bytes: u64,
     detected: Option<DetectedFrames>,
-    /// Names of the last line that may be a header.
     header: Option<Vec<u8>>,
-    /// Last bytes while no channels were found.
     sample: Vec<u8>,
     readings: u64,
     arrivals: VecDeque<(Duration, u64)>,
@@ -88,7 +81,6 @@ pub struct Monitor {
     unexplained: u32,
 }
 
-/// Frames of a known form, with their channels.
 #[derive(Debug)]
 struct DetectedFrames {
     channels: Vec<ChannelValues>,
@@ -98,7 +90,7 @@ struct DetectedFrames {
 }
 
 impl Monitor {
-    /// Takes what the source brought.
+    /// Adds an arrival.
     pub fn receive(&mut self, arrived: &Arrived) {
         let time_s = arrived.at.unix_ns as f64 * 1e-9;
         match &arrived.arrival {
@@ -152,7 +144,6 @@ impl Monitor {
         frames.into_iter().for_each(|frame| self.take(frame, at));
     }
 
-    /// Ends a line of text.
     fn end_line(&mut self, time_s: f64, at: Duration) {
         let line = std::mem::take(&mut self.partial);
         if line.trim_ascii().is_empty() {
@@ -209,7 +200,6 @@ impl Monitor {
         }
     }
 
-    /// Looks for channels in a line.
     fn find_text(&mut self, line: &[u8]) {
         let header = self.header.as_deref();
         let Some((names, named, uses_header)) = candidates(line, header).find(|(names, _, uses_header)| {
@@ -231,7 +221,6 @@ impl Monitor {
         self.unexplained = 0;
     }
 
-    /// Looks for binary frames in the last bytes, whose checksums tell how many channels they have.
     fn find_binary(&mut self) {
         for count in 1..=MOST_CHANNELS {
             let names = numbered(count);
@@ -247,7 +236,7 @@ impl Monitor {
         }
     }
 
-    /// The state now.
+    /// Returns the current state.
     pub fn record(&self, now: Duration) -> MonitorRecord {
         let recent = self.arrivals.iter().filter(|(at, _)| now.saturating_sub(*at) <= RATE_OVER);
         let (first, count) =
@@ -293,13 +282,13 @@ impl Monitor {
         })
     }
 
-    /// Fault of a source that brought no reading; `None` of any other.
+    /// Fault of a source without readings.
     pub fn fault(&self) -> Option<String> {
         let reason = || self.problem().unwrap_or("the source did not open".to_owned());
         (self.readings == 0).then(|| format!("there was no reading: {}", reason()))
     }
 
-    /// Names of the channels that were found, in their order; none before that.
+    /// Names of the detected channels.
     pub fn channel_names(&self) -> Vec<String> {
         self.detected
             .iter()
@@ -308,7 +297,7 @@ impl Monitor {
             .collect()
     }
 
-    /// True where the board names its values.
+    /// Returns whether the board names its values.
     pub fn is_named(&self) -> bool {
         self.detected.as_ref().is_some_and(|detected| detected.named)
     }
@@ -330,27 +319,26 @@ fn numbered(count: usize) -> Vec<String> {
     (1..=count).map(|i| format!("s{i}")).collect()
 }
 
-/// Channels that a line may have: their names, whether the board gives them, and whether it does so in the header.
+/// Names, whether the board gives them, and whether in the header.
 fn candidates<'a>(
     line: &'a [u8],
     header: Option<&'a [u8]>,
 ) -> impl Iterator<Item = (Vec<String>, bool, bool)> + 'a {
     let named = names_in_line(line).map(|names| (names, true, false));
     let headed = header.and_then(names_in_header).map(|names| (names, true, true));
-    // At most as many values as there are pieces between separators.
+    // There are at most as many values as pieces between separators.
     let pieces = line.split(|byte| b",; \t[]".contains(byte)).filter(|piece| !piece.is_empty()).count();
     let unnamed = (1..=pieces.min(MOST_CHANNELS)).rev().map(|count| (numbered(count), false, false));
     named.into_iter().chain(headed).chain(unnamed)
 }
 
-/// Names before `:` or `=` in a line, or the members of an object of JSON; none where there are none.
 fn names_in_line(line: &[u8]) -> Option<Vec<String>> {
     let text = std::str::from_utf8(line).ok()?.trim();
     let names: Vec<String> = if text.starts_with('{') {
         let object: serde_json::Map<String, serde_json::Value> = serde_json::from_str(text).ok()?;
         let mut names: Vec<String> =
             object.into_iter().filter(|(_, value)| value.is_number()).map(|(name, _)| name).collect();
-        // As the board sends them; the object has them by the alphabet.
+        // The order of the board; the object is sorted.
         names.sort_by_key(|name| text.find(&format!("\"{name}\"")));
         names
     } else {
@@ -365,7 +353,6 @@ fn names_in_line(line: &[u8]) -> Option<Vec<String>> {
     checked(names)
 }
 
-/// Names of a line of words.
 fn names_in_header(line: &[u8]) -> Option<Vec<String>> {
     let text = std::str::from_utf8(line).ok()?.trim();
     let separator = [';', '\t', ','].into_iter().find(|separator| text.contains(*separator)).unwrap_or(' ');
@@ -376,7 +363,6 @@ fn names_in_header(line: &[u8]) -> Option<Vec<String>> {
     checked(fields.into_iter().filter(|_| are_words).collect())
 }
 
-/// Names that may be those of channels: other than time and number of the frame, and none twice.
 fn checked(names: Vec<String>) -> Option<Vec<String>> {
     let names: Vec<String> = names.into_iter().filter(|name| !is_reserved(name)).collect();
     let mut sorted: Vec<String> = names.iter().map(|name| name.to_ascii_lowercase()).collect();
@@ -386,7 +372,7 @@ fn checked(names: Vec<String>) -> Option<Vec<String>> {
     usable.then_some(names)
 }
 
-/// Bytes as text of at most `most` characters: bytes that are not text, and control characters, are escaped.
+/// Escapes control characters and invalid bytes; at most `most` characters.
 pub fn escaped(bytes: &[u8], most: usize) -> String {
     let mut text = String::new();
     let mut count = 0;

@@ -1,4 +1,4 @@
-//! The thread of a session: takes the inputs of sources and users, and passes the outputs to the sinks.
+//! Thread of a session.
 
 use crate::feed::FeedWatch;
 use crate::input::{Arrival, Command, Input};
@@ -10,25 +10,24 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
-/// Most inputs that wait for the session. Beyond this the source waits, and the buffer of the device fills.
+/// Most waiting inputs; the source then waits.
 pub const WAITING: usize = 1024;
-/// Time between two state records.
 const STATE_EVERY: Duration = Duration::from_micros(16_667);
 
-/// Error for a source with readings at another pace than that of their recording.
+/// Error of a replay at another speed than 1.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "a recording at speed={speed} has other times than its readings, by which a low-pass filter and a tracker go; use speed=1, or `palpate replay`"
 )]
 pub struct PaceError {
-    /// The pace.
+    /// Speed.
     pub speed: f64,
 }
 
-/// Checks that the readings of a source come at the pace of their recording, if the estimation depends on their times.
+/// Checks the speed of a source, if the estimation depends on times.
 ///
 /// # Errors
-/// [`PaceError`] for another pace.
+/// [`PaceError`].
 pub fn check_pace(estimation: &Estimation, from: &SourceUrl) -> Result<(), PaceError> {
     match (estimation, from) {
         (Estimation::LowPass { .. } | Estimation::Track { .. }, SourceUrl::File { speed, .. })
@@ -40,8 +39,8 @@ pub fn check_pace(estimation: &Estimation, from: &SourceUrl) -> Result<(), PaceE
     }
 }
 
-/// Runs a session until the source has ended, all senders of inputs have gone, or it is to stop. Returns the fault of the feed: no reading at all, or
-/// none towards the end. Such a fault is also an event as soon as it is detected.
+/// Runs a session to the end of source, senders or stop. Returns the fault of the feed, which is also an
+/// event.
 pub fn run(
     session: &mut Session,
     clock: HostClock,
@@ -99,7 +98,7 @@ fn state(session: &Session, source: Option<&str>) -> StateRecord {
         let factor = channel.unit.factor();
         ChannelRecord {
             state: health.state,
-            // The range is infinite before the first reading, and JSON has no infinity.
+            // The range is infinite without readings, and JSON has no infinity.
             range: Some(health.range.map(|end| end / factor)).filter(|range| range[0] <= range[1]),
             noise_sd: health.noise_sd / factor,
         }

@@ -1,6 +1,4 @@
-//! Rules: messages, commands to the board and alarms for contacts within bands of position and force, and for events.
-//!
-//! A rule file is TOML:
+//! Rules: actions on contacts in bands of position and force, and on events. A rule file is TOML:
 //!
 //! ```toml
 //! [[rule]]
@@ -47,9 +45,9 @@ pub struct Rules(Vec<Rule>);
 pub struct Rule {
     /// Name.
     pub name: String,
-    /// Condition under which the rule acts.
+    /// Condition.
     pub condition: Condition,
-    /// Action of the rule.
+    /// Action.
     pub action: Action,
 }
 
@@ -58,23 +56,23 @@ pub struct Rule {
 pub enum Action {
     /// Publishes an MQTT message.
     Publish {
-        /// The topic.
+        /// Topic.
         topic: String,
-        /// The message.
+        /// Message.
         message: String,
     },
-    /// Sends a line to the board of the session.
+    /// Sends a line to the board.
     Command(String),
-    /// Raises an alarm with this text.
+    /// Raises an alarm.
     Alarm(String),
 }
 
-/// Rules of a file by action.
+/// Rules by action.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RulesByAction {
-    /// Rules that publish messages.
+    /// Rules that publish.
     pub publishing: Rules,
-    /// Rules that send commands to the board.
+    /// Rules that send commands.
     pub commanding: Rules,
     /// Rules that raise alarms.
     pub alarming: Rules,
@@ -83,32 +81,31 @@ pub struct RulesByAction {
 /// Condition of a rule.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Condition {
-    /// A contact is within these bands for the time `hold`.
+    /// A contact within bands.
     Contact {
-        /// Band of positions along the surface, in m.
+        /// Band of x in metres.
         x_m: Option<(f64, f64)>,
-        /// Band of positions across the surface, in m.
+        /// Band of y in metres.
         y_m: Option<(f64, f64)>,
-        /// Band of forces, in N.
+        /// Band of forces in newtons.
         force_n: Option<(f64, f64)>,
-        /// Time that the contact must spend within the bands before the rule acts, and outside them before it can act again.
+        /// Time within the bands, and outside before a repetition.
         hold: Duration,
     },
-    /// An event of this name occurs.
+    /// An event of this name.
     Event(String),
 }
 
-/// A rule file that cannot be used.
+/// Error of a rule file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{problem}")]
 pub struct RuleError {
-    /// The problem.
+    /// Problem.
     pub problem: String,
-    /// Byte range of the problem in the file.
+    /// Byte range in the file.
     pub span: Option<Range<usize>>,
 }
 
-/// Names of events in records.
 const EVENTS: [&str; 14] = [
     "source_opened",
     "source_lost",
@@ -125,13 +122,9 @@ const EVENTS: [&str; 14] = [
     "trouble",
     "mark",
 ];
-/// Events at which the board is away and cannot receive a command.
 const AWAY: [&str; 2] = ["source_lost", "source_ended"];
-/// Most bytes of a command.
 const LONGEST_COMMAND: usize = 200;
-/// Most characters of an alarm.
 const LONGEST_ALARM: usize = 200;
-/// Most rules of a file.
 const MOST: usize = 1000;
 
 #[derive(Deserialize)]
@@ -157,7 +150,7 @@ struct RuleIn {
 }
 
 impl RuleError {
-    /// The problem, with its line in the text.
+    /// Returns the problem with its line.
     pub fn with_line(&self, text: &str) -> String {
         match self.span.as_ref().and_then(|span| text.get(..span.start)) {
             Some(before) => format!("line {}: {}", before.matches('\n').count() + 1, self.problem),
@@ -167,10 +160,10 @@ impl RuleError {
 }
 
 impl Rules {
-    /// Parses the text of a rule file, for contacts on a surface of this extent.
+    /// Parses a rule file for a surface.
     ///
     /// # Errors
-    /// [`RuleError`] for the first problem, with its place; also for a band that contains no place on the surface.
+    /// The first problem, also a band beyond the surface.
     pub fn from_toml(text: &str, extent: Extent) -> Result<Self, RuleError> {
         let file: FileIn = toml::from_str(text)
             .map_err(|error| RuleError { problem: error.message().to_owned(), span: error.span() })?;
@@ -184,12 +177,13 @@ impl Rules {
         rules.collect::<Result<_, _>>().map(Self)
     }
 
-    /// The rules.
+    /// Rules.
     pub fn as_slice(&self) -> &[Rule] {
         &self.0
     }
 
-    /// The first rule with a band of forces. It needs a locator that [estimates the force](palpate_estimators::estimator::Locator::tells_force).
+    /// First rule with a band of forces, for a locator that
+    /// [estimates the force](palpate_estimators::estimator::Locator::tells_force).
     pub fn first_of_force(&self) -> Option<&Rule> {
         let asks = |rule: &&Rule| matches!(rule.condition, Condition::Contact { force_n: Some(_), .. });
         self.0.iter().find(asks)
@@ -209,15 +203,15 @@ impl Rules {
         sorted
     }
 
-    /// Text of a file with these rules.
+    /// Rule file.
     pub fn to_toml(&self) -> String {
         self.0.iter().map(Rule::to_toml).collect::<Vec<_>>().join("\n")
     }
 
-    /// Checks that all rules raise alarms, and can act with this locator.
+    /// Checks that all rules raise alarms that this locator supports.
     ///
     /// # Errors
-    /// A message about the first rule that does not.
+    /// A message about the first other rule.
     pub fn check_alarms(&self, locator: &Locator) -> Result<(), String> {
         if let Some(rule) = self.0.iter().find(|rule| !matches!(rule.action, Action::Alarm(_))) {
             return Err(format!(
@@ -324,7 +318,6 @@ impl Rule {
     }
 }
 
-/// The action of a rule at `rule` in the file: a message on a topic, or a command.
 fn action(
     rule: Range<usize>,
     topic: Option<Spanned<String>>,
@@ -363,7 +356,6 @@ fn action(
     }
 }
 
-/// The action of a rule with an `alarm`, which excludes the `others`.
 fn alarm_of(alarm: Spanned<String>, others: [Option<Spanned<String>>; 3]) -> Result<Action, RuleError> {
     if let Some(other) = others.into_iter().flatten().next() {
         let problem = "a rule has an `alarm`, or `topic` and `message`, or a `command`; write two rules";
@@ -415,7 +407,6 @@ fn band(
     ))
 }
 
-/// Refuses bands without possible contacts: bands of `y` on a line, and bands beside the surface.
 fn check_on_surface(
     given: &RuleIn,
     x_m: Option<(f64, f64)>,
@@ -454,26 +445,24 @@ pub struct RuleWatch {
     states: Vec<State>,
 }
 
-/// State of a rule.
 #[derive(Clone, Copy, Debug, Default)]
 struct State {
     acted: bool,
-    /// Instant since which the condition differs from `acted`.
     changed: Option<Duration>,
 }
 
 impl RuleWatch {
-    /// Initial state: all rules have yet to act.
+    /// Returns the initial state.
     pub fn new(rules: Rules) -> Self {
         Self { states: vec![State::default(); rules.0.len()], rules }
     }
 
-    /// The rules.
+    /// Rules.
     pub fn rules(&self) -> &Rules {
         &self.rules
     }
 
-    /// Takes the next output of a session, and calls `act` with each rule that acts now.
+    /// Passes each rule that acts on an output to `act`.
     pub fn add(&mut self, output: &Output, mut act: impl FnMut(&Rule)) {
         for (rule, state) in self.rules.0.iter().zip(&mut self.states) {
             let acts = match (output, &rule.condition) {
@@ -491,7 +480,6 @@ impl RuleWatch {
 }
 
 impl State {
-    /// Updates the state with the present condition, `holds`; true when the rule acts.
     fn next(&mut self, now: Duration, hold: Duration, holds: bool) -> bool {
         if holds == self.acted {
             self.changed = None;
@@ -576,7 +564,8 @@ mod tests {
     fn a_band_acts_once_it_holds_and_again_only_after_it_was_left_for_as_long() {
         let mut watch = RuleWatch::new(Rules::from_toml(FILE, beam()).unwrap());
         let mut acted = Vec::new();
-        // The contact bounces at 5 and 43 ms. It is within the band from 10, outside from 50 to 80, within again from 90.
+        // The contact bounces at 5 and 43 ms. It is within the band from 10, outside from 50 to 80, within
+        // again from 90.
         let course = [
             (0, None),
             (5, Some(30.0)),

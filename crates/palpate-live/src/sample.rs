@@ -1,4 +1,4 @@
-//! A reading with its estimate.
+//! Samples: readings with estimates.
 
 use crate::frame::Channel;
 use palpate_core::Estimate;
@@ -7,43 +7,42 @@ use palpate_mechanics::surface::Extent;
 use serde::Serialize;
 use std::time::Duration;
 
-/// A reading, its times, and its estimate.
+/// A reading with its estimate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sample {
-    /// Number of the reading in the session, from 0.
+    /// Number in the session, from 0.
     pub number: u64,
-    /// Time of the reading, in ns since 1970-01-01 00:00 UTC. If the frames contain the time by the board's clock, it is that time mapped to the host's
-    /// clock. The times of a session never decrease.
+    /// Increasing time in ns since 1970-01-01 00:00 UTC, by the board's clock if available.
     pub unix_ns: u64,
-    /// Instant of the last byte by the host's monotonic clock.
+    /// Instant of the last byte.
     pub arrived: Duration,
-    /// The received reading, in SI units or raw.
+    /// Received reading in SI units or raw.
     pub reading: Vec<f64>,
-    /// The reading that was located: tared and filtered.
+    /// Located reading: tared and filtered.
     pub tared: Vec<f64>,
-    /// The estimate.
+    /// Estimate.
     pub estimate: Estimate,
 }
 
-/// A sample as a record of JSON.
+/// Sample for JSON.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SampleRecord {
-    /// Number of the reading in the session, from 0.
+    /// Number in the session, from 0.
     pub number: u64,
     /// Seconds since 1970-01-01 00:00 UTC.
     pub time_s: f64,
-    /// The received reading, in the units of its channels.
+    /// Received reading in the units of the channels.
     pub reading: Vec<f64>,
-    /// The estimate.
+    /// Estimate.
     #[serde(flatten)]
     pub estimate: EstimateRecord,
-    /// Covariance of the position on a plane, from [`covariance_mm2`].
+    /// Covariance from [`covariance_mm2`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub covariance_mm2: Option<[f64; 3]>,
 }
 
 impl SampleRecord {
-    /// The record of a sample of these channels.
+    /// Returns the record of a sample.
     pub fn new(sample: &Sample, channels: &[Channel], extent: Extent) -> Self {
         let values = sample.reading.iter().zip(channels);
         Self {
@@ -56,7 +55,7 @@ impl SampleRecord {
     }
 }
 
-/// Covariance of the estimated position of the first contact on a plane: xx, xy and yy in mm². `None` on a line, and for an unknown covariance.
+/// Returns xx, xy, yy of a position on a plane in mm², if finite.
 pub fn covariance_mm2(estimate: &Estimate, extent: Extent) -> Option<[f64; 3]> {
     let uncertainty = estimate.contact.uncertainty.filter(|_| extent.width_m().is_some())?;
     let [xx, xy, _, yy, ..] = uncertainty.covariance;

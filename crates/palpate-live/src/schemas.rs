@@ -1,27 +1,23 @@
-//! Topics of recordings and of Foxglove, their JSON schemas, and their messages.
+//! Topics with JSON schemas and messages.
 
 use crate::sample::{Sample, covariance_mm2};
 use palpate_estimators::estimate_record::EstimateRecord;
 use palpate_mechanics::surface::Extent;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-/// Topics, in the order of their channels in the file.
+/// Topics in the order of the file.
 pub const TOPICS: [(&str, &str, &str); 3] = [
     (READING, "palpate.Reading", READING_SCHEMA),
     (ESTIMATE, "palpate.Estimate", ESTIMATE_SCHEMA),
     (EVENT, "palpate.Event", EVENT_SCHEMA),
 ];
-/// Readings of the board.
 pub const READING: &str = "/reading";
-/// Estimates.
 pub const ESTIMATE: &str = "/estimate";
-/// Events.
 pub const EVENT: &str = "/event";
 
 const READING_SCHEMA: &str = r#"{"title":"palpate.Reading","type":"object","properties":{
 "number":{"type":"integer","description":"which reading of the session, from 0"},
 "values":{"type":"object","additionalProperties":{"type":"number"},"description":"what the board sent, one number a channel, in the units of the metadata"}}}"#;
-/// Schema of estimates.
 pub const ESTIMATE_SCHEMA: &str = r#"{"title":"palpate.Estimate","type":"object","properties":{
 "number":{"type":"integer","description":"the reading that it is of"},
 "x_mm":{"type":"number"},"y_mm":{"type":"number"},"force_n":{"type":"number"},
@@ -32,37 +28,27 @@ pub const ESTIMATE_SCHEMA: &str = r#"{"title":"palpate.Estimate","type":"object"
 "status":{"type":"string"},
 "modes":{"type":"array","items":{"type":"object"}},"further":{"type":"array","items":{"type":"object"}},
 "located":{"type":"array","items":{"type":"number"},"description":"the tared reading that was located, in SI units or raw"}}}"#;
-/// Schema of events.
 pub const EVENT_SCHEMA: &str = r#"{"title":"palpate.Event","type":"object","properties":{
 "time_s":{"type":"number","description":"seconds since 1970-01-01 00:00 UTC"},
 "event":{"type":"string"},"text":{"type":"string"},"name":{"type":"string"},"state":{"type":"string"},"why":{"type":"string"},
 "seconds":{"type":"number"},"x_mm":{"type":"number"},"y_mm":{"type":"number"},"force_n":{"type":"number"}}}"#;
 
-/// Message of `/reading`.
 pub struct ReadingMessage<'a> {
-    /// The sample.
     pub sample: &'a Sample,
-    /// Name and factor of each channel.
     pub channels: &'a [(String, f64)],
 }
 
-/// Message of `/estimate`.
 #[derive(serde::Serialize)]
 pub struct EstimateMessage<'a> {
-    /// Number of the reading.
     pub number: u64,
-    /// The estimate.
     #[serde(flatten)]
     pub estimate: EstimateRecord,
-    /// Covariance of the position on a plane: xx, xy and yy in mm².
     #[serde(skip_serializing_if = "Option::is_none")]
     pub covariance_mm2: Option<[f64; 3]>,
-    /// The reading that was located.
     pub located: &'a [f64],
 }
 
 impl<'a> EstimateMessage<'a> {
-    /// Message of a sample.
     pub fn new(sample: &'a Sample, extent: Extent) -> Self {
         Self {
             number: sample.number,
@@ -91,10 +77,8 @@ impl Serialize for Values<'_> {
     }
 }
 
-/// The number from the board for a value: `number * factor` is the value to the last bit.
-///
-/// If the value was computed as `number * factor`, the quotient or one of its two neighbours among floating-point numbers gives it exactly. Any other
-/// value gets the quotient.
+/// Returns `number` of `value = number * factor` to the last bit: the quotient or a neighbouring
+/// floating-point number.
 pub fn in_board_units(value: f64, factor: f64) -> f64 {
     let quotient = value / factor;
     let near = [quotient, quotient.next_down(), quotient.next_up()];

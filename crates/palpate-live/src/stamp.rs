@@ -1,47 +1,46 @@
-//! Instants by the host's clocks.
+//! Instants by the clocks of the host.
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// An instant by the host's two clocks.
+/// An instant by both clocks of the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stamp {
-    /// Time since the [`HostClock`] was started, by the monotonic clock, the reference of all durations.
+    /// Time since the start of the [`HostClock`].
     pub elapsed: Duration,
-    /// Nanoseconds since 1970-01-01 00:00 UTC by the wall clock, which may be set at any time.
+    /// Nanoseconds since 1970-01-01 00:00 UTC, by a clock that may be set.
     pub unix_ns: u64,
 }
 
-/// The host's clocks, from a common start.
+/// Monotonic and wall clock of the host.
 #[derive(Clone, Copy, Debug)]
 pub struct HostClock {
     start: Instant,
-    /// Factor by which the monotonic clock runs fast.
     speed: u32,
 }
 
 impl HostClock {
-    /// Clocks that start now.
+    /// Starts the clocks.
     #[expect(clippy::new_without_default, reason = "a clock's start is not a default value")]
     pub fn new() -> Self {
         Self::with_speed(1)
     }
 
-    /// Clocks that start now, with a monotonic clock that is `speed` times as fast, for a simulated board and machine of this speed.
+    /// Starts clocks with a monotonic clock of a simulation, `speed` times as fast.
     pub fn with_speed(speed: u32) -> Self {
         Self { start: Instant::now(), speed }
     }
 
-    /// Time since the start, by the monotonic clock.
+    /// Time since the start.
     pub fn elapsed(&self) -> Duration {
         self.start.elapsed().saturating_mul(self.speed)
     }
 
-    /// Real time that corresponds to `span` of the monotonic clock.
+    /// Returns the real time of `span`.
     pub fn real_time(&self, span: Duration) -> Duration {
         span / self.speed.max(1)
     }
 
-    /// The present instant.
+    /// Present instant.
     pub fn now(&self) -> Stamp {
         let unix = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         Stamp { elapsed: self.elapsed(), unix_ns: unix.as_nanos() as u64 }

@@ -1,4 +1,4 @@
-//! Contacts, positions, and the extent of a surface. Contact and position are the types of the microcontroller crate.
+//! Contacts, positions, and the extent of a surface.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,21 +15,21 @@ use palpate_numerics::OutOfRange;
     extent.bounds_in_words()
 )]
 pub struct OffSurface {
-    /// Name of the object at that position.
+    /// Name of the object.
     pub what: &'static str,
-    /// Number in its list, from 1.
+    /// Number in its list.
     pub number: usize,
-    /// Position.
+    /// The position.
     pub position: Position,
     /// Extent of the surface.
     pub extent: Extent,
 }
 
 impl OffSurface {
-    /// Checks that all positions of a list lie on a surface.
+    /// Checks that all positions are on a surface.
     ///
     /// # Errors
-    /// [`OffSurface`] for the first position off the surface.
+    /// [`OffSurface`] for the first that is off.
     pub fn check(what: &'static str, positions: &[Position], extent: Extent) -> Result<(), Self> {
         match positions.iter().position(|position| !extent.contains(*position)) {
             Some(i) => Err(Self { what, number: i + 1, position: positions[i], extent }),
@@ -38,7 +38,7 @@ impl OffSurface {
     }
 }
 
-/// The line or rectangle on which contacts lie.
+/// Line or rectangle of contacts.
 ///
 /// ```
 /// use palpate_mechanics::contact::{Extent, Position};
@@ -51,12 +51,12 @@ impl OffSurface {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Unchecked", into = "Unchecked")]
 pub enum Extent {
-    /// A line along x, with y = 0.
+    /// Along x, with y = 0.
     Line {
         /// Length along x.
         length: Side,
     },
-    /// A rectangle with one corner at the origin.
+    /// One corner at the origin.
     Plane {
         /// Length along x.
         length: Side,
@@ -65,11 +65,10 @@ pub enum Extent {
     },
 }
 
-/// Side of an [`Extent`], in metres: greater than 0 and finite.
+/// Side of an [`Extent`], positive and finite, in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Side(f64);
 
-/// An extent as in files.
 #[derive(Serialize, Deserialize)]
 struct Unchecked {
     length_m: f64,
@@ -91,10 +90,10 @@ impl From<Extent> for Unchecked {
 }
 
 impl Extent {
-    /// A plane when a width is given, otherwise a line; lengths in metres.
+    /// Returns a plane when a width is given, otherwise a line.
     ///
     /// # Errors
-    /// [`OutOfRange`] for a length or width that is not greater than 0 and finite.
+    /// [`OutOfRange`] for a side that is not positive and finite.
     pub fn new(length_m: f64, width_m: Option<f64>) -> Result<Self, OutOfRange> {
         OutOfRange::check_positive([("the length in metres", length_m)])?;
         OutOfRange::check_positive(width_m.map(|width_m| ("the width in metres", width_m)))?;
@@ -104,46 +103,44 @@ impl Extent {
         })
     }
 
-    /// A line of this length, in metres.
+    /// Returns a line.
     ///
     /// # Errors
-    /// [`OutOfRange`] for a length that is not greater than 0 and finite.
+    /// As [`Extent::new`].
     pub fn line(length_m: f64) -> Result<Self, OutOfRange> {
         Self::new(length_m, None)
     }
 
-    /// A plane of this length and width, in metres.
+    /// Returns a plane.
     ///
     /// # Errors
-    /// [`OutOfRange`] for a length or width that is not greater than 0 and finite.
+    /// As [`Extent::new`].
     pub fn plane(length_m: f64, width_m: f64) -> Result<Self, OutOfRange> {
         Self::new(length_m, Some(width_m))
     }
 
-    /// A line of a checked length.
     pub(crate) const fn checked_line(length_m: f64) -> Self {
         Self::Line { length: Side(length_m) }
     }
 
-    /// A plane with checked sides.
     pub(crate) const fn checked_plane(length_m: f64, width_m: f64) -> Self {
         Self::Plane { length: Side(length_m), width: Side(width_m) }
     }
 
-    /// The line along x of this length.
+    /// Line along x.
     #[must_use]
     pub fn along_x(&self) -> Self {
         Self::checked_line(self.length_m())
     }
 
-    /// Length along x, in metres.
+    /// Length along x.
     pub fn length_m(&self) -> f64 {
         match *self {
             Self::Line { length } | Self::Plane { length, .. } => length.0,
         }
     }
 
-    /// Width along y, in metres; `None` for a line.
+    /// Width along y; `None` for a line.
     pub fn width_m(&self) -> Option<f64> {
         match *self {
             Self::Line { .. } => None,
@@ -151,7 +148,7 @@ impl Extent {
         }
     }
 
-    /// Number of coordinates of a position: 1 on a line, 2 on a plane.
+    /// Number of coordinates of a position.
     pub fn dimensions(&self) -> usize {
         match self {
             Self::Line { .. } => 1,
@@ -159,7 +156,7 @@ impl Extent {
         }
     }
 
-    /// Sides, in metres: the length, and the width of a plane; one for each coordinate of a contact.
+    /// Length and, on a plane, width.
     pub fn sides_m(&self) -> impl Iterator<Item = f64> + use<> {
         std::iter::once(self.length_m()).chain(self.width_m())
     }
@@ -172,12 +169,12 @@ impl Extent {
         }
     }
 
-    /// The coordinates of a position, in metres: x, and y on a plane.
+    /// x and, on a plane, y.
     pub fn coordinates_m(&self, position: Position) -> impl Iterator<Item = f64> + use<> {
         std::iter::once(position.x_m).chain(self.if_plane(position.y_m))
     }
 
-    /// A position as text: "75 mm", or "75 mm, 40 mm" on a plane or for a position off a line.
+    /// Formats a position: "75 mm", or "75 mm, 40 mm" off a line.
     pub fn place_in_words(&self, position: Position) -> String {
         let x = format_length_mm(position.x_m);
         match self {
@@ -186,8 +183,7 @@ impl Extent {
         }
     }
 
-    /// Positions as text, in millimetres with two decimals at most: "35, 40 mm"; on a plane "(10, 20), (10, 180) mm", and for a
-    /// grid of at least two by three "x 10, 20, 30 with y 50, 100 mm each".
+    /// Formats positions: "35, 40 mm", "(10, 20), (10, 180) mm", or the columns and rows of a grid.
     pub fn places_in_words(&self, positions: &[Position]) -> String {
         let listed = |place: &dyn Fn(&Position) -> String| {
             format!("{} mm", positions.iter().map(place).collect::<Vec<_>>().join(", "))
@@ -203,7 +199,7 @@ impl Extent {
         }
     }
 
-    /// Bounds of positions as text: "0 and 400 mm", or "0 and 300 mm along, 0 and 200 mm across" on a plane.
+    /// Formats the bounds: "0 and 300 mm along, 0 and 200 mm across".
     pub fn bounds_in_words(&self) -> String {
         let along = format!("0 and {}", format_length_mm(self.length_m()));
         match self.width_m() {
@@ -212,9 +208,7 @@ impl Extent {
         }
     }
 
-    /// True for a position on the extent, its boundary included.
-    ///
-    /// The tolerance is a rounding error of 10⁻⁹ of the length.
+    /// True for a position on the extent, within 10⁻⁹ of the length.
     pub fn contains(&self, position: Position) -> bool {
         let slack_m = 1e-9 * self.length_m();
         let within = |value: f64, size: f64| value >= -slack_m && value <= size + slack_m;
@@ -227,7 +221,6 @@ fn mm(length_m: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// Texts of the columns and rows of a grid with its positions row by row.
 fn grid(positions: &[Position]) -> Option<(Vec<String>, Vec<String>)> {
     let first = mm(positions.first()?.y_m);
     let columns: Vec<String> =

@@ -1,9 +1,6 @@
-//! Readings of sensors on an elastic surface under a contact, and the resulting limit of contact location.
+//! Forward models of elastic surfaces, and the Cramér–Rao bound of contact location.
 //!
-//! [`surface`] contains the surfaces (beams, plates, the digit) and computes the reading of a sensor for a
-//! force at a position. [`sensing`] describes the measured quantities, positions and faults of sensors. [`limit`] is the bound on the
-//! error of any unbiased estimator. [`units`] turns "400 mm" into 0.4 m and back. Lengths are in metres, forces in newtons, moduli in
-//! pascals; forces are positive downward, deflections upward.
+//! Units are SI; forces are positive downward, deflections upward.
 //!
 //! ```
 //! use palpate_mechanics::contact::{Contact, Position};

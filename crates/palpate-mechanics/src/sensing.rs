@@ -1,4 +1,4 @@
-//! Sensors: their kinds, their layout, and the faults of real channels.
+//! Sensors, their layout and channel errors.
 
 use std::fmt;
 
@@ -10,24 +10,24 @@ use crate::contact::{Extent, Position};
 use crate::units::{Dimension, Unit};
 use palpate_numerics::OutOfRange;
 
-/// Kind of a sensor: the quantity that it measures.
+/// Quantity that a sensor measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SensorKind {
-    /// Displacement normal to the surface, in metres, positive upward.
+    /// Displacement normal to the surface, positive upward, in metres.
     Deflection,
-    /// The deflection's derivative along the length, in radians.
+    /// Derivative of the deflection along the length, in radians.
     Slope,
-    /// Strain along the length on the lower face, positive in tension.
+    /// Strain along the lower face, positive in tension.
     Strain,
-    /// Force of a support on the surface, in newtons, positive upward.
+    /// Force of a support on the surface, positive upward, in newtons.
     Reaction,
-    /// A channel in its own unit, without a model.
+    /// A channel without a model.
     Raw,
 }
 
 impl SensorKind {
-    /// Every kind, in the order of declaration, for the index of tables and the order in messages.
+    /// All kinds, as declared.
     pub const ALL: [Self; 5] = [Self::Deflection, Self::Slope, Self::Strain, Self::Reaction, Self::Raw];
 
     /// Name in a rig.
@@ -52,7 +52,7 @@ impl SensorKind {
         }
     }
 
-    /// The unit in recordings: mm, mrad, ue (microstrain), N, or none.
+    /// Unit in recordings.
     pub fn unit(self) -> Unit {
         let symbol = match self {
             Self::Deflection => "mm",
@@ -71,39 +71,38 @@ impl fmt::Display for SensorKind {
     }
 }
 
-/// One sensor: measured quantity, position, and channel. Plain data, which [`Layout::new`] checks.
+/// A sensor, checked by [`Layout::new`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sensor {
     /// Measured quantity.
     pub kind: SensorKind,
-    /// Position on the surface; without meaning for a raw channel.
+    /// Position; unused for a raw channel.
     pub position: Position,
-    /// Name, unique in the layout: "deflection_1", or the name of the recording's channel.
+    /// Unique name.
     pub name: String,
-    /// The faults of the channel.
+    /// Errors of the channel.
     pub channel: ChannelModel,
 }
 
-/// Layout: all the sensors of one surface. A reading has one value for each, in this order.
+/// Sensors of a surface, in the order of a reading.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Unchecked")]
 pub struct Layout {
     sensors: Vec<Sensor>,
 }
 
-/// A layout as in a file.
 #[derive(Deserialize)]
 struct Unchecked {
     sensors: Vec<Sensor>,
 }
 
-/// A sensor of a layout with a number out of range.
+/// A sensor value out of range.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("sensor {number}: {fault}")]
 pub struct LayoutError {
-    /// Number of the sensor, from 1.
+    /// Number of the sensor.
     pub number: usize,
-    /// The number, with its bound.
+    /// Value and bound.
     pub fault: OutOfRange,
 }
 
@@ -116,10 +115,10 @@ impl TryFrom<Unchecked> for Layout {
 }
 
 impl Layout {
-    /// A layout of these sensors.
+    /// Creates a layout.
     ///
     /// # Errors
-    /// [`LayoutError`] for the first sensor with a number out of range.
+    /// [`LayoutError`] for the first fault.
     ///
     /// ```
     /// use palpate_mechanics::sensing::{Layout, SensorKind};
@@ -140,9 +139,7 @@ impl Layout {
         Ok(Self { sensors })
     }
 
-    /// `count` sensors of one kind, evenly placed at x_i = i·l/(count + 1) for i = 1…count, with perfect channels.
-    ///
-    /// `length_m` is the surface's length l in metres. The names are "deflection_1", "deflection_2" and so on.
+    /// Returns `count` perfect sensors at the [`even_positions`], named "deflection_1" etc.
     pub fn even(kind: SensorKind, count: usize, length_m: f64) -> Self {
         let sensors = even_positions(count, length_m)
             .enumerate()
@@ -161,15 +158,15 @@ impl Layout {
         &self.sensors
     }
 
-    /// The sensors, as the start of another layout.
+    /// Returns the sensors.
     pub fn into_sensors(self) -> Vec<Sensor> {
         self.sensors
     }
 
-    /// Changes the sensors; on an error the layout stays unchanged.
+    /// Changes the sensors.
     ///
     /// # Errors
-    /// [`LayoutError`] as for [`Layout::new`].
+    /// [`LayoutError`]; the layout is then unchanged.
     pub fn edit(&mut self, edit: impl FnOnce(&mut Vec<Sensor>)) -> Result<(), LayoutError> {
         let mut sensors = self.sensors.clone();
         edit(&mut sensors);
@@ -177,7 +174,7 @@ impl Layout {
         Ok(())
     }
 
-    /// This layout with every sensor moved to its `position`; a sensor stays where that is not finite.
+    /// Moves every sensor to a finite `position`.
     #[must_use]
     pub fn with_positions(mut self, mut position: impl FnMut(&Sensor) -> Position) -> Self {
         for sensor in &mut self.sensors {
@@ -189,7 +186,7 @@ impl Layout {
         self
     }
 
-    /// Sets the channel of a sensor, by its index from 0, dead or not; no effect where no such sensor exists.
+    /// Disables or enables a sensor, by index.
     pub fn set_dead(&mut self, sensor: usize, dead: bool) {
         if let Some(sensor) = self.sensors.get_mut(sensor) {
             sensor.channel.dead = dead;
@@ -206,8 +203,7 @@ impl Layout {
         self.sensors.is_empty()
     }
 
-    /// Positions of the sensors of each kind as text, in millimetres with two decimals at most: "deflection 35, 40 mm; strain 200 mm", and
-    /// "reaction (10, 20), (10, 180) mm" on a plane.
+    /// Formats the positions: "deflection 35, 40 mm; strain 200 mm".
     pub fn places_in_words(&self, extent: Extent) -> String {
         let of = |kind: SensorKind| {
             let sensors = self.sensors.iter().filter(|sensor| sensor.kind == kind);
@@ -227,10 +223,10 @@ impl Layout {
         self.sensors.iter().map(|sensor| sensor.name.clone()).collect()
     }
 
-    /// [`ChannelModel::reading_sd`] of each sensor; `None` for dead ones.
+    /// [`ChannelModel::reading_sd`] of each sensor; `None` if disabled.
     ///
     /// # Errors
-    /// [`NoiseError`] for the first active sensor without noise, or when no sensor is active.
+    /// [`NoiseError`] for singular noise, or no active sensor.
     pub fn reading_sds(&self) -> Result<Vec<Option<f64>>, NoiseError> {
         let sds = self.sensors.iter().enumerate().map(|(i, sensor)| {
             let ChannelModel { noise_sd, resolution, dead, .. } = sensor.channel;
@@ -249,12 +245,12 @@ impl Layout {
     }
 }
 
-/// `count` positions x_i = i·l/(count + 1) for i = 1…count.
+/// Positions i·l/(count + 1) for i = 1…count.
 pub fn even_positions(count: usize, length_m: f64) -> impl Iterator<Item = Position> {
     (1..=count).map(move |i| Position::along(i as f64 * length_m / (count + 1) as f64))
 }
 
-/// Sensors of one kind with one channel model, for a surface that is not yet chosen.
+/// Sensors of one kind and channel model.
 ///
 /// ```
 /// use palpate_mechanics::sensing::SensorKind;
@@ -269,38 +265,38 @@ pub struct SensorGroup {
     pub kind: SensorKind,
     /// Positions of the sensors.
     pub placement: Placement,
-    /// The faults of each channel.
+    /// Errors of each channel.
     pub channel: ChannelModel,
 }
 
-/// Placement of the sensors of a group.
+/// Positions of a group.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Placement {
-    /// This number of sensors along the length l, at i·l/(count + 1) for i = 1…count.
+    /// At the [`even_positions`].
     Evenly(usize),
-    /// At the inner crossings of a grid of columns × rows: x = i·length/(columns + 1), y = j·width/(rows + 1).
+    /// Inner crossings of columns × rows: i·length/(columns + 1), j·width/(rows + 1).
     Grid(usize, usize),
-    /// At these positions.
+    /// Given positions.
     At(Vec<Position>),
 }
 
 impl SensorKind {
-    /// `count` sensors of this kind along the length l of a surface, at i·l/(count + 1) for i = 1…count.
+    /// Places sensors at the [`even_positions`].
     pub fn evenly(self, count: usize) -> SensorGroup {
         self.placed(Placement::Evenly(count))
     }
 
-    /// Sensors of this kind on a plane, at the inner crossings of a grid: `columns` along the length, `rows` across.
+    /// Places sensors as [`Placement::Grid`].
     pub fn grid(self, columns: usize, rows: usize) -> SensorGroup {
         self.placed(Placement::Grid(columns, rows))
     }
 
-    /// Sensors of this kind at positions along the length, in metres from its left end.
+    /// Places sensors along the length, in metres.
     pub fn at_x(self, x_m: impl IntoIterator<Item = f64>) -> SensorGroup {
         self.placed(Placement::At(x_m.into_iter().map(Position::along).collect()))
     }
 
-    /// Sensors of this kind at positions on a plane.
+    /// Places sensors on a plane.
     pub fn at_positions(self, positions: impl IntoIterator<Item = Position>) -> SensorGroup {
         self.placed(Placement::At(positions.into_iter().collect()))
     }
@@ -311,14 +307,14 @@ impl SensorKind {
 }
 
 impl SensorGroup {
-    /// This group with Gaussian noise of standard deviation `sd`, in the SI unit of the kind; at least 0.
+    /// Sets the standard deviation of the noise.
     #[must_use]
     pub fn noise(mut self, sd: f64) -> Self {
         self.channel.noise_sd = sd;
         self
     }
 
-    /// This group with this channel model: noise, resolution, gain and offset errors, range.
+    /// Sets the channel model.
     #[must_use]
     pub fn channel(mut self, channel: ChannelModel) -> Self {
         self.channel = channel;
@@ -326,10 +322,9 @@ impl SensorGroup {
     }
 }
 
-/// The faults of one channel, in the SI unit of its sensor (or raw). The default channel is perfect.
+/// Error model of one channel, in SI units.
 ///
-/// reading = saturate(quantise((1 + g)·value + o + noise)), and always 0 for a dead channel. Plain data: [`Layout::new`] and a
-/// setup's `sensors` refuse a number out of range.
+/// saturate(quantise((1 + g)·value + o + noise)), or 0 if disabled.
 ///
 /// ```
 /// use palpate_mechanics::sensing::ChannelModel;
@@ -339,33 +334,33 @@ impl SensorGroup {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ChannelModel {
-    /// Standard deviation of the Gaussian noise of a reading; at least 0.
+    /// Standard deviation of the noise; ≥ 0.
     pub noise_sd: f64,
     /// Quantisation step; 0 for none.
     pub resolution: f64,
-    /// Bound of gain errors g, which are uniform within ± this; at least 0 and below 1.
+    /// Bound of the uniform gain error g, within [0, 1).
     pub gain_error: f64,
-    /// Bound of offset errors o, which are uniform within ± this; at least 0.
+    /// Bound of the uniform offset error o; ≥ 0.
     pub offset_error: f64,
-    /// Bound of position errors, which are uniform within ± this along each side of the surface, in metres; at least 0.
+    /// Bound of the uniform position error; ≥ 0.
     pub position_error_m: f64,
-    /// Lowest and highest value that the channel can report; `None` for a channel that does not saturate.
+    /// Saturation limits.
     pub range: Option<(f64, f64)>,
-    /// True for a channel that always reports 0.
+    /// True for a disabled channel.
     pub dead: bool,
 }
 
-/// Gain and offset errors of one simulated bench, one value for each sensor.
+/// Errors of one simulated bench.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChannelErrors {
     /// g of each sensor.
     pub gains: Vec<f64>,
-    /// o of each sensor, in the SI unit of the sensor (or raw).
+    /// o of each sensor.
     pub offsets: Vec<f64>,
 }
 
 impl ChannelErrors {
-    /// Draws a gain and an offset for each sensor of `layout`, once per simulated recording.
+    /// Draws the errors.
     pub fn draw(layout: &Layout, rng: &mut impl Rng) -> Self {
         let mut errors = Self::none(layout);
         for (i, sensor) in layout.sensors.iter().enumerate() {
@@ -375,17 +370,15 @@ impl ChannelErrors {
         errors
     }
 
-    /// No gain and no offset errors.
+    /// Returns zero errors.
     pub fn none(layout: &Layout) -> Self {
         Self { gains: vec![0.0; layout.len()], offsets: vec![0.0; layout.len()] }
     }
 }
 
-/// Readings of faulty channels: the sensors of `layout` at the true values `clean_reading`, with gain and offset `errors`, fresh noise
-/// from `rng`, quantisation and saturation.
+/// Returns readings at the true values `clean_reading`.
 ///
-/// One normal number is drawn for every sensor, independent of its faults, so a fault of one channel does not change the noise of the
-/// others. Values without a sensor are ignored.
+/// One random number per sensor: a fault of one channel leaves the others' noise unchanged.
 pub fn measure(
     layout: &Layout,
     clean_reading: &[f64],
@@ -396,7 +389,7 @@ pub fn measure(
     measure_with_noise(layout, clean_reading, errors, &noise)
 }
 
-/// Readings of faulty channels as in [`measure`], with given noise of variance 1, one value for each sensor.
+/// Returns readings with given noise of variance 1.
 pub fn measure_with_noise(
     layout: &Layout,
     clean_reading: &[f64],
@@ -415,10 +408,10 @@ pub fn measure_with_noise(
 }
 
 impl ChannelModel {
-    /// Checks that every number is in range.
+    /// Checks all values.
     ///
     /// # Errors
-    /// [`OutOfRange`] for the first number out of range.
+    /// [`OutOfRange`] for the first fault.
     pub fn check(&self) -> Result<(), OutOfRange> {
         OutOfRange::check_not_negative([
             ("the noise", self.noise_sd),
@@ -434,12 +427,11 @@ impl ChannelModel {
         OutOfRange::check("finite and below the upper one", lower, |low| low.is_finite() && low < high)
     }
 
-    /// Standard deviation of a reading, √(σ² + q²/12) with σ the noise and q the resolution, in the sensor's SI unit.
+    /// √(σ² + q²/12), with noise σ and resolution q.
     pub fn reading_sd(&self) -> f64 {
         self.noise_sd.hypot(self.resolution / 12f64.sqrt())
     }
 
-    /// Quantises and saturates the analogue `value`; 0 for a dead channel.
     fn report(&self, value: f64) -> f64 {
         if self.dead {
             return 0.0;
@@ -453,25 +445,25 @@ impl ChannelModel {
     }
 }
 
-/// Error of a layout without usable noise for the weights of its readings.
+/// Error of a layout with singular noise.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoiseError {
-    /// An active sensor has neither noise nor resolution: the noise is singular.
+    /// A sensor without noise and resolution.
     #[error(
         "sensor {number} ({kind}) has noise {noise_sd} and resolution {resolution}; one of them must be greater than 0, \
          otherwise its precision is unlimited"
     )]
     Singular {
-        /// Number of the sensor, from 1.
+        /// Number of the sensor.
         number: usize,
         /// Measured quantity.
         kind: SensorKind,
-        /// Standard deviation of its noise, in its SI unit.
+        /// Standard deviation of the noise.
         noise_sd: f64,
-        /// Quantisation step, in its SI unit.
+        /// Quantisation step.
         resolution: f64,
     },
-    /// Every channel is dead.
+    /// All channels are disabled.
     #[error("all {count} sensors are dead; at least 1 must be alive")]
     AllDead {
         /// Number of sensors.
@@ -480,7 +472,7 @@ pub enum NoiseError {
 }
 
 impl NoiseError {
-    /// Advice on changes to a rig.
+    /// Suggested remedy.
     pub const fn help(&self) -> &'static str {
         match self {
             Self::Singular { .. } => "add `noise = \"5 um\"` to [sensors], in the unit of the readings",

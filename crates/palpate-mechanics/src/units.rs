@@ -1,6 +1,4 @@
-//! Units of measure: "400 mm" becomes 0.4 m, and back in text.
-//!
-//! All values inside palpate are in SI units; other units appear only here, in files and in messages.
+//! Units of measure; values inside palpate are SI.
 
 use std::fmt;
 use std::str::FromStr;
@@ -17,7 +15,7 @@ pub const fn um(length: f64) -> f64 {
     length * 1e-6
 }
 
-/// Newtons; the name documents the number's unit.
+/// Newtons.
 pub const fn newtons(force: f64) -> f64 {
     force
 }
@@ -39,8 +37,6 @@ pub const fn microstrain(strain: f64) -> f64 {
 
 /// A finite value and its dimension.
 ///
-/// Parsed from "400 mm", "200GPa", "5 µm", "5 %" or a plain number; displayed with a readable prefix.
-///
 /// ```
 /// use palpate_mechanics::units::{Dimension, Quantity};
 ///
@@ -52,45 +48,45 @@ pub const fn microstrain(strain: f64) -> f64 {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quantity {
-    /// The value in SI units (m, N, Pa, rad, m/m, kg/m³, N/m, N·m/rad, m/s, s, Hz; a ratio of 5 % is 0.05).
+    /// SI value.
     pub value: f64,
     /// Dimension of the value.
     pub dimension: Dimension,
 }
 
-/// Error of a text that is not the expected quantity.
+/// Error of a text.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum UnitError {
     /// The text is empty.
     #[error("empty; write a number and a unit, as in `400 mm`")]
     Empty,
-    /// The text does not start with a decimal number.
+    /// It does not start with a number.
     #[error("`{text}` does not start with a number; write a number and a unit, as in `400 mm`")]
     NotANumber {
         /// The text.
         text: String,
     },
-    /// The number is NaN or infinite, or becomes infinite in SI units.
+    /// The SI value is not finite.
     #[error("`{text}` is not finite; the largest number is 1.8e308")]
     NotFinite {
         /// The text.
         text: String,
     },
-    /// No unit of any dimension has this symbol.
+    /// The unit is unknown.
     #[error("unknown unit `{unit}`; known are {}", Symbols(None))]
     UnknownUnit {
-        /// Text in the place of the unit.
+        /// Text after the number.
         unit: String,
     },
-    /// The unit is unknown, or its dimension is not the expected one.
+    /// The unit is unknown or of another dimension.
     #[error("{} `{unit}`; {} is one of {}", complaint(unit), wanted.noun(), Symbols(Some(*wanted)))]
     WrongUnit {
-        /// Text in the place of the unit.
+        /// Text after the number.
         unit: String,
         /// Expected dimension.
         wanted: Dimension,
     },
-    /// A plain number without the required unit.
+    /// A required unit is missing.
     #[error("`{text}` has no unit; {} is one of {}", wanted.noun(), Symbols(Some(*wanted)))]
     MissingUnit {
         /// The text.
@@ -98,7 +94,7 @@ pub enum UnitError {
         /// Expected dimension.
         wanted: Dimension,
     },
-    /// A unit after an expected plain number.
+    /// A unit after a plain number.
     #[error("`{text}` has a unit, but a plain number is expected")]
     UnwantedUnit {
         /// The text.
@@ -110,7 +106,6 @@ fn complaint(unit: &str) -> &'static str {
     if Unit::from_symbol(unit).is_some() { "wrong unit" } else { "unknown unit" }
 }
 
-/// The symbols of one dimension, or of all, for messages.
 struct Symbols(Option<Dimension>);
 
 impl fmt::Display for Symbols {
@@ -125,12 +120,10 @@ impl fmt::Display for Symbols {
 }
 
 impl Quantity {
-    /// Parses `text` as a quantity of the dimension `wanted` and returns its SI value.
-    ///
-    /// A ratio may be a plain number (0.05) or a percentage ("5 %"); every other dimension needs its unit.
+    /// Parses a quantity of a dimension as its SI value; a ratio may be a plain number.
     ///
     /// # Errors
-    /// [`UnitError`], with the text or unit and the accepted units.
+    /// [`UnitError`].
     pub fn parse_as(text: &str, wanted: Dimension) -> Result<f64, UnitError> {
         match text.parse::<Self>() {
             Ok(quantity) if quantity.dimension == wanted => Ok(quantity.value),
@@ -149,8 +142,7 @@ impl Quantity {
         }
     }
 
-    /// Parses the two ends of an interval as quantities of the dimension `wanted`; either end may be empty. A plain number at the
-    /// beginning has the unit of the end.
+    /// Parses the ends of an interval; a plain start has the unit of the end.
     ///
     /// ```
     /// use palpate_mechanics::units::{Dimension, Quantity};
@@ -160,7 +152,7 @@ impl Quantity {
     /// ```
     ///
     /// # Errors
-    /// [`UnitError`] of the faulty end.
+    /// [`UnitError`].
     pub fn parse_span([from, to]: [&str; 2], wanted: Dimension) -> Result<[Option<f64>; 2], UnitError> {
         let end = |text: &str| -> Result<Option<f64>, UnitError> {
             if text.is_empty() { Ok(None) } else { Self::parse_as(text, wanted).map(Some) }
@@ -203,7 +195,6 @@ impl FromStr for Quantity {
     }
 }
 
-/// The longest decimal number at the beginning of `text`, and the rest without the space between them.
 fn split(text: &str) -> (&str, &str) {
     let bytes = text.as_bytes();
     let digits_from = |from: usize| bytes[from..].iter().take_while(|b| b.is_ascii_digit()).count();
@@ -229,7 +220,7 @@ fn split(text: &str) -> (&str, &str) {
     (number, rest.trim_start())
 }
 
-/// A count with thousands separators: "26,850".
+/// Formats with thousands separators: "26,850".
 pub fn format_count(count: u64) -> String {
     let digits = count.to_string();
     let mut text = String::new();
@@ -242,12 +233,11 @@ pub fn format_count(count: u64) -> String {
     text
 }
 
-/// A length in metres as text: millimetres with at most four decimals, "44.4444 mm", and scientific from 10¹⁵ mm on.
+/// Formats in millimetres with at most four decimals.
 pub fn format_length_mm(length_m: f64) -> String {
     format!("{} mm", rounded(length_m * 1e3, 4))
 }
 
-/// Decimal notation with at most `decimals` decimals and no trailing zeros; scientific for large values.
 fn rounded(value: f64, decimals: usize) -> String {
     if value.abs() >= 1e15 {
         return format!("{value:.decimals$e}");
@@ -258,7 +248,7 @@ fn rounded(value: f64, decimals: usize) -> String {
 }
 
 impl fmt::Display for Quantity {
-    /// Six significant digits in the largest unit that keeps the number at 1 or above; for a plain number all digits before the point.
+    /// Six significant digits, or all of a plain number's before the point.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let whole = self.value.abs() >= 1e5 && self.value.abs() < 1e15 && self.dimension == Dimension::None;
         let rounded = if whole {
@@ -271,7 +261,7 @@ impl fmt::Display for Quantity {
 }
 
 impl Quantity {
-    /// All digits in the largest unit that keeps the number at 1 or above, for values from a file.
+    /// Formats all digits, in the unit of `Display`.
     ///
     /// ```
     /// use palpate_mechanics::units::{Dimension, Quantity};
@@ -291,8 +281,7 @@ impl Quantity {
     }
 }
 
-/// The largest unit that keeps the number at 1 or above. Some units are parsed but never chosen, and lengths below 10 m
-/// stay in millimetres.
+/// Largest unit with a number of at least 1; metres from 10 m on.
 fn readable_unit(quantity: Quantity) -> Option<Unit> {
     let magnitude = quantity.value.abs() * (1.0 + 1e-9);
     if magnitude == 0.0 {
@@ -317,30 +306,30 @@ pub enum Dimension {
     Length,
     /// Force, in newtons.
     Force,
-    /// Elastic modulus or pressure, in pascals.
+    /// Modulus or pressure, in pascals.
     Modulus,
     /// Angle, in radians.
     Angle,
     /// Strain, metres per metre.
     Strain,
-    /// A ratio; 1 is the whole.
+    /// Ratio; 1 is 100 %.
     Ratio,
-    /// Mass per volume, in kg/m³.
+    /// Density, in kg/m³.
     Density,
-    /// Stiffness of a spring, force per length, in N/m.
+    /// Stiffness, in N/m.
     Stiffness,
-    /// Stiffness of a rotational spring, couple per angle, in N·m/rad.
+    /// Rotational stiffness, in N·m/rad.
     RotationalStiffness,
-    /// Length per time, in m/s.
+    /// Speed, in m/s.
     Speed,
     /// Time, in seconds.
     Time,
-    /// Cycles per second, in hertz.
+    /// Frequency, in hertz.
     Frequency,
 }
 
 impl Dimension {
-    /// The noun for the dimension in messages, with its article.
+    /// Noun with article, for messages.
     pub const fn noun(self) -> &'static str {
         match self {
             Self::None => "a plain number",
@@ -359,22 +348,19 @@ impl Dimension {
         }
     }
 
-    /// The units of the dimension, ASCII spellings only, smallest first.
+    /// Units in ASCII, ascending.
     pub fn units(self) -> impl Iterator<Item = Unit> {
         Unit::in_ascii().filter(move |unit| unit.dimension() == self)
     }
 }
 
-/// Factor from a unit to the SI unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Scale {
-    /// 10 to this power; scaling moves the decimal point, so no digit is lost.
+    /// Power of 10, without rounding.
     Power(i32),
-    /// Any other factor.
     Factor(f64),
 }
 
-/// Symbol, dimension and scale. Where a unit has several spellings, palpate writes the first.
 const UNITS: &[(&str, Dimension, Scale)] = &[
     ("", Dimension::None, Scale::Power(0)),
     ("nm", Dimension::Length, Scale::Power(-9)),
@@ -431,9 +417,7 @@ const UNITS: &[(&str, Dimension, Scale)] = &[
     ("kHz", Dimension::Frequency, Scale::Power(3)),
 ];
 
-/// A unit of measure.
-///
-/// Serialised as its symbol.
+/// A unit, serialised as its symbol.
 ///
 /// ```
 /// use palpate_mechanics::units::Unit;
@@ -446,15 +430,14 @@ const UNITS: &[(&str, Dimension, Scale)] = &[
 pub struct Unit(usize);
 
 impl Unit {
-    /// The unit of a plain number.
+    /// Unit of a plain number.
     pub const NONE: Self = Self(0);
 
-    /// The unit with this symbol ("mm", "µε"); the empty symbol is that of a plain number.
+    /// Returns the unit of a symbol; "" for a plain number.
     pub fn from_symbol(symbol: &str) -> Option<Self> {
         UNITS.iter().position(|(known, ..)| *known == symbol).map(Self)
     }
 
-    /// All units with a symbol in ASCII, in the order of the table.
     fn in_ascii() -> impl Iterator<Item = Self> {
         let written = |unit: &Self| unit.symbol().is_ascii() && !unit.symbol().is_empty();
         (0..UNITS.len()).map(Self).filter(written)
@@ -470,7 +453,7 @@ impl Unit {
         self.entry().1
     }
 
-    /// Factor to the SI unit.
+    /// SI factor.
     pub fn factor(self) -> f64 {
         match self.entry().2 {
             Scale::Power(exponent) => 10f64.powi(exponent),
@@ -478,10 +461,7 @@ impl Unit {
         }
     }
 
-    /// Parses a decimal number in this unit as an SI value: "1.2" in mm is exactly the number 0.0012.
-    ///
-    /// `None` unless `number` is a decimal number. Infinities and NaN, from the text or by overflow, are
-    /// passed on.
+    /// Parses a decimal number, or passes on infinity and NaN.
     pub fn parse_si(self, number: &str) -> Option<f64> {
         match self.entry().2 {
             Scale::Power(0) => number.parse().ok(),
@@ -490,8 +470,7 @@ impl Unit {
         }
     }
 
-    /// Formats an SI value as the shortest decimal number in this unit that `parse_si` parses to it: exactly, where
-    /// the unit is a power of ten of the SI unit.
+    /// Formats the shortest number that `parse_si` parses to an SI value.
     pub fn format_si(self, value_si: f64) -> String {
         match self.entry().2 {
             Scale::Power(0) => format_shifted(value_si, 0),
@@ -531,7 +510,6 @@ impl<'de> Deserialize<'de> for Unit {
     }
 }
 
-/// `number` · 10^`power`, rounded once.
 fn parse_shifted(number: &str, power: i32) -> Option<f64> {
     let (mantissa, exponent) = match number.find(['e', 'E']) {
         Some(at) => (number.get(..at)?, number.get(at + 1..)?.parse::<i32>().ok()?),
@@ -544,7 +522,7 @@ fn parse_shifted(number: &str, power: i32) -> Option<f64> {
     format!("{mantissa}e{}", exponent.saturating_add(power)).parse().ok()
 }
 
-/// The shortest digits of `value`, with the decimal point moved `power` places to the right.
+/// Decimal point moved `power` places to the right.
 fn format_shifted(value: f64, power: i32) -> String {
     let scientific = format!("{value:e}");
     let Some((mantissa, exponent)) = scientific.split_once('e') else { return scientific };
@@ -557,7 +535,6 @@ fn format_shifted(value: f64, power: i32) -> String {
     place_point(sign, &digits, exponent + power)
 }
 
-/// Decimal notation where it is short, scientific elsewhere; `exponent` is that of the first digit.
 fn place_point(sign: &str, digits: &str, exponent: i32) -> String {
     let count = digits.len();
     match usize::try_from(exponent) {

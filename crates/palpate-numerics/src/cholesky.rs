@@ -1,24 +1,18 @@
-//! Cholesky factorisation A = L·Lᵀ of a symmetric positive definite matrix.
-//!
-//! Performance: the trailing update of the blocked algorithm (Golub and Van Loan, *Matrix Computations*, 4.2.5) takes
-//! nearly all of the n³/3 multiply-adds. It is a matrix product, which ndarray passes to a tuned kernel.
+//! Blocked Cholesky factorisation (Golub and Van Loan, *Matrix Computations*, 4.2.5).
 
 use ndarray::linalg::general_mat_mul;
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, ArrayViewMut2, Axis, s};
 
-/// Number of rows of a product that are computed together, from the columns that differ from 0.
 const BLOCK: usize = 64;
 
-/// Largest number of columns that are factored, and of rows that are solved for, one after the other; more are halved.
+/// Largest size without recursion.
 const NARROW: usize = 16;
 
-/// Number of rows that are solved for side by side.
 const LANES: usize = 8;
 
-/// Columns of a triangle that are updated as a rectangle; the part above the diagonal is unused.
 const GRAM: usize = 48;
 
-/// The factor L of A = L·Lᵀ, lower triangular.
+/// The factor L of A = L·Lᵀ.
 ///
 /// ```
 /// use ndarray::array;
@@ -40,22 +34,22 @@ pub struct Cholesky {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("the matrix is not positive definite: pivot {row} of {size} is {pivot:e}")]
 pub struct NotPositiveDefinite {
-    /// Index of the failed pivot, from 1.
+    /// Failed pivot, from 1.
     pub row: usize,
-    /// Number of rows of the matrix.
+    /// Size of the matrix.
     pub size: usize,
-    /// Value, which must be greater than 0.
+    /// Value of the pivot.
     pub pivot: f64,
 }
 
 impl Cholesky {
-    /// Factors a square matrix; only its lower triangle is read.
+    /// Factors a square matrix from its lower triangle.
     ///
     /// # Errors
-    /// [`NotPositiveDefinite`], with the pivot that is not greater than 0 or not finite.
+    /// [`NotPositiveDefinite`].
     ///
     /// # Panics
-    /// When the matrix is not square.
+    /// For a rectangular matrix.
     pub fn factor(mut matrix: Array2<f64>) -> Result<Self, NotPositiveDefinite> {
         let size = matrix.nrows();
         assert_eq!(size, matrix.ncols(), "a matrix to be factored is square");
@@ -69,10 +63,10 @@ impl Cholesky {
         Ok(Self { lower: matrix })
     }
 
-    /// The factorisation with this L, which must have a positive diagonal.
+    /// Wraps L of positive diagonal.
     ///
     /// # Panics
-    /// When the matrix is not square.
+    /// For a rectangular matrix.
     pub fn from_lower(lower: &ArrayView2<f64>) -> Self {
         assert_eq!(lower.nrows(), lower.ncols(), "a factor is square");
         Self { lower: lower.as_standard_layout().into_owned() }
@@ -83,7 +77,7 @@ impl Cholesky {
         self.lower.view()
     }
 
-    /// Number of rows of the matrix.
+    /// Number of rows.
     pub fn size(&self) -> usize {
         self.lower.nrows()
     }
@@ -103,7 +97,7 @@ impl Cholesky {
     /// Replaces b by L⁻¹·b.
     ///
     /// # Panics
-    /// When b is shorter than the matrix.
+    /// For a short b.
     pub fn solve_lower_in_place(&self, b: &mut [f64]) {
         let lower = self.lower.as_slice().expect("it lies row by row");
         for (i, row) in lower.chunks_exact(self.size().max(1)).enumerate() {
@@ -129,10 +123,10 @@ impl Cholesky {
         self.solve_upper(&self.solve_lower(b))
     }
 
-    /// L⁻¹·B, in blocks that are matrix products.
+    /// L⁻¹·B.
     ///
     /// # Panics
-    /// When the number of rows of B differs from that of the matrix.
+    /// For a wrong number of rows.
     pub fn solve_lower_matrix(&self, mut b: Array2<f64>) -> Array2<f64> {
         assert_eq!(b.nrows(), self.size(), "a right side has as many rows as the matrix");
         let columns = b.ncols();
@@ -143,15 +137,15 @@ impl Cholesky {
     /// A⁻¹·B.
     ///
     /// # Panics
-    /// When the number of rows of B differs from that of the matrix.
+    /// For a wrong number of rows.
     pub fn solve_matrix(&self, b: Array2<f64>) -> Array2<f64> {
         self.solve_upper_matrix(self.solve_lower_matrix(b))
     }
 
-    /// L⁻ᵀ·B, in blocks that are matrix products.
+    /// L⁻ᵀ·B.
     ///
     /// # Panics
-    /// When the number of rows of B differs from that of the matrix.
+    /// For a wrong number of rows.
     pub fn solve_upper_matrix(&self, mut b: Array2<f64>) -> Array2<f64> {
         assert_eq!(b.nrows(), self.size(), "a right side has as many rows as the matrix");
         self.substitute_backward(b.view_mut(), 0);
@@ -163,7 +157,7 @@ impl Cholesky {
         Self::gram_of_lower(&self.inverse_lower())
     }
 
-    /// L⁻¹, lower triangular.
+    /// L⁻¹.
     pub fn inverse_lower(&self) -> Array2<f64> {
         let mut inverse = Array2::eye(self.size());
         // Right of the diagonal block, rows stay 0.
@@ -171,8 +165,7 @@ impl Cholesky {
         inverse
     }
 
-    /// Solves for the rows of B from `start` on, with the earlier rows already eliminated: one half after the other. In rows before `end`
-    /// at most the first `columns(end)` columns differ from 0.
+    /// Above row `end` only `columns(end)` columns are nonzero.
     fn substitute_forward(&self, mut b: ArrayViewMut2<f64>, start: usize, columns: &impl Fn(usize) -> usize) {
         let size = b.nrows();
         if size > NARROW {
@@ -197,7 +190,6 @@ impl Cholesky {
         }
     }
 
-    /// Solves with Lᵀ for the rows of B from `start` on, with the later rows already eliminated: one half after the other.
     fn substitute_backward(&self, mut b: ArrayViewMut2<f64>, start: usize) {
         let size = b.nrows();
         if size > NARROW {
@@ -220,7 +212,7 @@ impl Cholesky {
         }
     }
 
-    /// Mᵀ·M for a lower triangular M: A⁻¹ for M = L⁻¹.
+    /// Mᵀ·M for a lower triangular M.
     pub fn gram_of_lower(lower: &Array2<f64>) -> Array2<f64> {
         let size = lower.nrows();
         let mut gram = Array2::zeros((size, size));
@@ -236,7 +228,7 @@ impl Cholesky {
     }
 }
 
-/// Factors the first `columns` of a matrix, and subtracts L₂₁·L₂₁ᵀ from the lower triangle of the rest. Only the lower triangle is read.
+/// Factors `columns` of a lower triangle, and updates the rest.
 pub(super) fn factor_leading(
     matrix: ArrayViewMut2<'_, f64>,
     columns: usize,
@@ -248,8 +240,8 @@ pub(super) fn factor_leading(
     Ok(())
 }
 
-/// Factors columns, from the diagonal down: one half after the other (Gustavson, *Recursion leads to automatic variable blocking
-/// for dense linear-algebra algorithms*, 1997).
+/// Recursive factorisation (Gustavson, *Recursion leads to automatic variable blocking for dense
+/// linear-algebra algorithms*, 1997).
 fn factor_panel(mut panel: ArrayViewMut2<'_, f64>) -> Result<(), NotPositiveDefinite> {
     let columns = panel.ncols();
     if columns <= NARROW {
@@ -261,7 +253,6 @@ fn factor_panel(mut panel: ArrayViewMut2<'_, f64>) -> Result<(), NotPositiveDefi
     factor_panel(right).map_err(|error| NotPositiveDefinite { row: error.row + half, ..error })
 }
 
-/// Factors at most [`NARROW`] columns: the square on the diagonal element by element, then the rows below, some side by side.
 fn factor_narrow(panel: ArrayViewMut2<'_, f64>) -> Result<(), NotPositiveDefinite> {
     let (size, columns) = panel.dim();
     let (mut square, mut below) = panel.split_at(Axis(0), columns);
@@ -299,7 +290,7 @@ fn factor_narrow(panel: ArrayViewMut2<'_, f64>) -> Result<(), NotPositiveDefinit
     Ok(())
 }
 
-/// Subtracts A·Aᵀ from the lower triangle of a matrix with as many rows as A, or from its first columns.
+/// Subtracts A·Aᵀ from a lower triangle, or its first columns.
 #[expect(clippy::needless_pass_by_value, reason = "a view is handed on as the matrix is")]
 fn subtract_gram(mut matrix: ArrayViewMut2<'_, f64>, a: ArrayView2<'_, f64>) {
     let columns = matrix.ncols();

@@ -1,39 +1,38 @@
 //! Distribution functions.
 
-/// Half-width of a normal distribution's 95 % interval, in standard deviations.
+/// Half-width of the normal 95 % interval.
 pub const NORMAL_95: f64 = 1.959_963_984_540_054;
-/// Half-width of a normal distribution's 99 % interval, in standard deviations.
+/// Half-width of the normal 99 % interval.
 pub const NORMAL_99: f64 = 2.575_829_303_548_900_4;
 
-/// 95 % quantile of χ² with two degrees of freedom, −2·ln 0.05: the squared size, in standard
-/// deviations, of a normal distribution's 95 % ellipse.
+/// 95 % quantile of χ² with two degrees of freedom, −2·ln 0.05.
 pub const ELLIPSE_95: f64 = 5.991_464_547_107_979;
 
-/// The ends of the 95 % interval of a normal distribution.
+/// 95 % interval of a normal distribution.
 #[inline]
 pub fn normal_interval_95(mean: f64, sd: f64) -> (f64, f64) {
     (mean - NORMAL_95 * sd, mean + NORMAL_95 * sd)
 }
 
-/// The smallest interval that contains two others.
+/// Smallest interval around two others.
 #[inline]
 pub fn hull(one: (f64, f64), other: (f64, f64)) -> (f64, f64) {
     (one.0.min(other.0), one.1.max(other.1))
 }
 
-/// The smallest interval that contains an interval and a value.
+/// Smallest interval around an interval and a value.
 #[inline]
 pub fn holding(interval: (f64, f64), value: f64) -> (f64, f64) {
     hull(interval, (value, value))
 }
 
-/// The part of an interval from 0 to `size`.
+/// Part of an interval within 0 and `size`.
 #[inline]
 pub fn clamped_interval((low, high): (f64, f64), size: f64) -> (f64, f64) {
     (low.max(0.0), high.min(size))
 }
 
-/// Root of a rising function by bisection: the end of the range where `is_below` is true, after this number of halvings.
+/// Bisects for the end of `is_below`.
 #[inline]
 pub fn bisect((mut low, mut high): (f64, f64), halvings: usize, is_below: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..halvings {
@@ -43,29 +42,29 @@ pub fn bisect((mut low, mut high): (f64, f64), halvings: usize, is_below: impl F
     0.5 * (low + high)
 }
 
-/// The standard normal distribution Φ(z).
+/// Standard normal distribution function Φ(z).
 pub fn normal_cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
-/// A standard normal distribution truncated at two ends.
+/// A truncated standard normal distribution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalPart {
-    /// ln of its probability, also where the probability itself underflows.
+    /// Logarithm of its probability, also where that underflows.
     pub ln_share: f64,
-    /// Mean of the truncated distribution.
+    /// Mean.
     pub mean: f64,
-    /// Variance of the truncated distribution.
+    /// Variance.
     pub variance: f64,
 }
 
-/// The standard normal distribution truncated to `from` … `to`, with `to` > `from`, for any distance from 0 and any width.
+/// Truncates the standard normal distribution, `to` > `from`.
 pub fn normal_between(from: f64, to: f64) -> NormalPart {
-    /// Beyond this value the tail is computed from its continued fraction.
+    /// Start of the continued fraction.
     const TAIL: f64 = 6.0;
-    /// Beyond this value the tail is negligible.
+    /// Start of the negligible tail.
     const ALL: f64 = 9.0;
-    /// Largest width of a part with uniform density, not far out.
+    /// Largest width of a uniform density.
     const NARROW: f64 = 1e-4;
     if from > TAIL {
         return upper_tail(from, to);
@@ -95,8 +94,7 @@ pub fn normal_between(from: f64, to: f64) -> NormalPart {
 
 const ROOT_TWO_PI: f64 = 2.506_628_274_631_000_5;
 
-/// The part from `from`, far above 0, to `to`. With Mills' ratio m(z) = Φ(−z)/φ(z) the share is φ(from)·(m(from) − r·m(to)),
-/// r = φ(to)/φ(from).
+/// Share φ(from)·(m(from) − r·m(to)), with Mills' ratio m and r = φ(to)/φ(from).
 fn upper_tail(from: f64, to: f64) -> NormalPart {
     // The density falls by the factor e over 1/from, so it is uniform over a much narrower part.
     let fall = (to - from) * from;
@@ -108,7 +106,7 @@ fn upper_tail(from: f64, to: f64) -> NormalPart {
     let ratio = (-0.5 * (to - from) * (to + from)).exp();
     let left = mills_ratio(from) - if ratio > 0.0 { ratio * mills_ratio(to) } else { 0.0 };
     let mean = (1.0 - ratio) / left;
-    // Far out, the truncated distribution is exponential: its standard deviation is its mean minus its start.
+    // Far out, the distribution is exponential, with equal mean and standard deviation above its start.
     let above = mean - from;
     let variance = if from > 1e3 && ratio == 0.0 {
         above * above
@@ -119,21 +117,18 @@ fn upper_tail(from: f64, to: f64) -> NormalPart {
     NormalPart { ln_share: left.ln() - 0.5 * from * from - ROOT_TWO_PI.ln(), mean, variance }
 }
 
-/// Φ(−z)/φ(z) for z of at least 6, by its continued fraction (Abramowitz and Stegun, 26.2.14).
+/// Φ(−z)/φ(z) for z ≥ 6 (Abramowitz and Stegun, 26.2.14).
 fn mills_ratio(z: f64) -> f64 {
     const LEVELS: usize = 16;
     1.0 / (1..=LEVELS).rev().fold(z, |below, level| z + level as f64 / below)
 }
 
-/// The z with Φ(z) = `share`, for `share` between 0 and 1, by bisection to the last bits.
+/// Inverts Φ for `share` between 0 and 1.
 pub fn normal_quantile(share: f64) -> f64 {
     bisect((-39.0, 39.0), 80, |z| normal_cdf(z) < share)
 }
 
-/// The probability that a χ² variable with `freedom` degrees of freedom exceeds `value`, for `value` ≥ 0. A variable with no degrees of freedom is 0.
-///
-/// With x = value/2 it is Σ e⁻ˣ·xʲ/Γ(j + 1) over j = 0, 1, … < freedom/2 for an even number of degrees. For an odd one it is erfc(√x) plus
-/// that sum over j = ½, 3/2, … < freedom/2 (Abramowitz and Stegun, 26.4.4 and 26.4.5).
+/// P(χ² > `value`), `value` ≥ 0 (Abramowitz and Stegun, 26.4.4 and 26.4.5).
 pub fn chi_squared_survival(value: f64, freedom: usize) -> f64 {
     let x = 0.5 * value;
     let odd = freedom % 2 == 1;
@@ -145,7 +140,7 @@ pub fn chi_squared_survival(value: f64, freedom: usize) -> f64 {
     if count == 0 {
         return start;
     }
-    // From the largest term, at j near x, the other terms follow by the ratios j/x and x/(j + 1); most of them are negligible.
+    // From the largest term, at j near x, the other terms follow by the ratios j/x and x/(j + 1).
     let least = if odd { 0.5 } else { 0.0 };
     let largest = (x - least).clamp(0.0, (count - 1) as f64).floor();
     let at = least + largest;
@@ -155,7 +150,6 @@ pub fn chi_squared_survival(value: f64, freedom: usize) -> f64 {
     start + term + sum_of_products(term, below) + sum_of_products(term, above)
 }
 
-/// Sum of a first term and its products with successive ratios, until the remainder is negligible. Ratios do not grow.
 fn sum_of_products(first: f64, ratios: impl Iterator<Item = f64>) -> f64 {
     let mut sum = 0.0;
     let mut term = first;
@@ -169,8 +163,7 @@ fn sum_of_products(first: f64, ratios: impl Iterator<Item = f64>) -> f64 {
     sum
 }
 
-/// The value that a χ² variable of `freedom` ≥ 1 degrees of freedom exceeds with probability `tail`, between 0 and 1, by
-/// bisection.
+/// Critical value of χ² with `freedom` ≥ 1.
 pub fn chi_squared_critical_value(tail: f64, freedom: usize) -> f64 {
     let (mut low, mut high) = (0.0, freedom as f64);
     while chi_squared_survival(high, freedom) > tail {
@@ -179,7 +172,7 @@ pub fn chi_squared_critical_value(tail: f64, freedom: usize) -> f64 {
     bisect((low, high), 60, |value| chi_squared_survival(value, freedom) > tail)
 }
 
-/// ln of the density of Student's t distribution with ν > 0 degrees of freedom, not necessarily an integer.
+/// Logarithm of Student's t density, ν > 0.
 pub fn student_ln_density(t: f64, freedom: f64) -> f64 {
     let constant = libm::lgamma(0.5 * (freedom + 1.0))
         - libm::lgamma(0.5 * freedom)
@@ -187,11 +180,8 @@ pub fn student_ln_density(t: f64, freedom: f64) -> f64 {
     constant - 0.5 * (freedom + 1.0) * (t * t / freedom).ln_1p()
 }
 
-/// Probability that the absolute value of a Student's t variable with 1 to 1,000 degrees of freedom ν exceeds `t` ≥ 0.
-///
-/// With x = π/2 − arctan(t/√ν) it is the integral of sin^(ν−1) from 0 to x over that from 0 to π/2, each by Simpson's rule.
+/// P(|t| > `t`) of Student's distribution, 1 ≤ ν ≤ 1,000, by integrals of sin^(ν−1).
 pub fn student_survival(t: f64, freedom: f64) -> f64 {
-    /// Number of half-intervals of Simpson's rule: the integrand is a power at 0, and smooth elsewhere.
     const HALVES: usize = 400;
     let integral = |to: f64| {
         let step = to / HALVES as f64;
@@ -203,13 +193,13 @@ pub fn student_survival(t: f64, freedom: f64) -> f64 {
     integral(to) / integral(std::f64::consts::FRAC_PI_2)
 }
 
-/// Value that the absolute value of a Student's t variable with 1 to 1,000 degrees of freedom exceeds with a probability between 0 and 1.
+/// Critical value of |t|, 1 ≤ ν ≤ 1,000.
 pub fn student_critical_value(tail: f64, freedom: f64) -> f64 {
     const MOST: f64 = 1e6;
     bisect((0.0, MOST), 80, |t| student_survival(t, freedom) > tail)
 }
 
-/// Probability of at least `least` of `trials` independent events, each of probability `share`.
+/// Probability of at least `least` of `trials` events of probability `share`.
 pub fn binomial_tail(trials: usize, least: usize, share: f64) -> f64 {
     let mut term = (trials as f64 * (-share).ln_1p()).exp();
     let mut fewer = 0.0;
@@ -224,7 +214,7 @@ pub fn binomial_tail(trials: usize, least: usize, share: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Closed forms for one and two degrees of freedom, and a table for four: P(|t| > 8.610) = 0.001.
+    /// Closed forms, and P(|t| > 8.610) = 0.001 for four degrees.
     #[test]
     fn student_tails_are_those_of_closed_forms_and_tables() {
         for t in [0.0, 0.3, 2.0, 40.0] {
@@ -261,7 +251,6 @@ mod tests {
         }
     }
 
-    /// ln of the share, mean and variance by a plain sum over the part.
     fn summed(from: f64, to: f64) -> [f64; 3] {
         const STEPS: usize = 400_000;
         let to = to.min(from.max(0.0) + 40.0);

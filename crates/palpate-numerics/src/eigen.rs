@@ -1,17 +1,17 @@
-//! Eigenvalues and eigenvectors of a small symmetric matrix.
+//! Eigenvalues of a small symmetric matrix.
 
 use ndarray::{Array1, Array2, Axis};
 
-/// Largest number of sweeps over all pairs, far more than any matrix needs: convergence is quadratic.
+/// Convergence is quadratic.
 const MOST_SWEEPS: usize = 60;
 
-/// A = U·diag(d)·Uᵀ for a symmetric matrix A: the eigenvalues d in descending order, and U with the eigenvectors as its columns.
+/// A = U·diag(d)·Uᵀ, d descending, by cyclic Jacobi rotations (Golub and Van Loan, *Matrix Computations*,
+/// 8.5).
 ///
-/// Cyclic Jacobi rotations (Golub and Van Loan, *Matrix Computations*, 8.5): 6·n³ multiply-adds for each sweep, so for tens of
-/// rows rather than hundreds. The mean of both triangles of A is used.
+/// 6·n³ multiply-adds per sweep. Both triangles are averaged.
 ///
 /// # Panics
-/// When the matrix is not square.
+/// For a rectangular matrix.
 pub fn symmetric_eigen(matrix: &Array2<f64>) -> (Array1<f64>, Array2<f64>) {
     let n = matrix.nrows();
     assert_eq!(n, matrix.ncols(), "a symmetric matrix is square");
@@ -20,8 +20,8 @@ pub fn symmetric_eigen(matrix: &Array2<f64>) -> (Array1<f64>, Array2<f64>) {
     for _ in 0..MOST_SWEEPS {
         let mut rotated = false;
         for (p, q) in (1..n).flat_map(|q| (0..q).map(move |p| (p, q))) {
-            // Small relative to its own row and column, so that small eigenvalues are exact too; never true in a matrix that
-            // is not finite.
+            // Small relative to its own row and column, so that small eigenvalues are exact; never true for
+            // NaN.
             if a[[p, q]].abs() > f64::EPSILON * (a[[p, p]] * a[[q, q]]).abs().sqrt() {
                 rotate(&mut a, &mut u, p, q);
                 rotated = true;
@@ -36,7 +36,6 @@ pub fn symmetric_eigen(matrix: &Array2<f64>) -> (Array1<f64>, Array2<f64>) {
     (order.iter().map(|i| a[[*i, *i]]).collect(), u.select(Axis(1), &order))
 }
 
-/// The rotation in the plane of p and q that makes a_pq = 0.
 fn rotate(a: &mut Array2<f64>, u: &mut Array2<f64>, p: usize, q: usize) {
     let tau = (a[[q, q]] - a[[p, p]]) / (2.0 * a[[p, q]]);
     let t = tau.signum() / (tau.abs() + tau.hypot(1.0));

@@ -1,15 +1,12 @@
-//! Elliptic integrals after Carlson, and Jacobi's elliptic functions by the arithmetic–geometric mean.
+//! Carlson's elliptic integrals and Jacobi's elliptic functions.
 
-/// Largest spread of the arguments for which a series of the fifth order is exact to double precision: its remainder
-/// is of the sixth order, and 2⁻⁵¹ has the sixth root 0.0028.
+/// Series remainder of sixth order: (2⁻⁵¹)^(1/6) = 0.0028.
 const SPREAD: f64 = 0.0028;
-/// Largest number of steps of the arithmetic–geometric mean; each step squares the error, so eight suffice for k′ = 10⁻³⁰⁰.
+/// Eight suffice for k′ = 10⁻³⁰⁰.
 const MOST_MEANS: usize = 16;
 
-/// Carlson's R_F(x, y, z) = ½·∫₀^∞ dt/√((t + x)(t + y)(t + z)) for x, y, z ≥ 0, at most one of them 0, to about 10⁻¹⁵.
-///
-/// By duplication: each step moves the arguments towards their mean and does not change the value (Carlson, *Numerical
-/// computation of real or complex elliptic integrals*, 1995, algorithm 1).
+/// R_F(x, y, z) = ½·∫₀^∞ dt/√((t + x)(t + y)(t + z)), at most one argument 0 (Carlson, *Numerical computation
+/// of real or complex elliptic integrals*, 1995, algorithm 1).
 pub fn carlson_rf(mut x: f64, mut y: f64, mut z: f64) -> f64 {
     loop {
         let mean = (x + y + z) / 3.0;
@@ -25,8 +22,8 @@ pub fn carlson_rf(mut x: f64, mut y: f64, mut z: f64) -> f64 {
     }
 }
 
-/// Carlson's R_D(x, y, z) = (3/2)·∫₀^∞ dt/((t + z)·√((t + x)(t + y)(t + z))) for x, y ≥ 0, at most one of them 0, and
-/// z > 0, to about 10⁻¹⁵ (Carlson 1995, algorithm 4).
+/// R_D(x, y, z) = (3/2)·∫₀^∞ dt/((t + z)·√((t + x)(t + y)(t + z))), z > 0, at most one of x and y 0 (Carlson
+/// 1995, algorithm 4).
 pub fn carlson_rd(mut x: f64, mut y: f64, mut z: f64) -> f64 {
     let (mut sum, mut share) = (0.0, 1.0);
     loop {
@@ -49,7 +46,7 @@ pub fn carlson_rd(mut x: f64, mut y: f64, mut z: f64) -> f64 {
     }
 }
 
-/// Jacobi's elliptic functions at one argument, and the integral of dn².
+/// Jacobi's elliptic functions at one argument.
 ///
 /// ```
 /// use palpate_numerics::Jacobi;
@@ -70,11 +67,7 @@ pub struct Jacobi {
 }
 
 impl Jacobi {
-    /// The functions of `u` for the parameter m = 1 − `complement`, where 0 < `complement` ≤ 1.
-    ///
-    /// φ_N = 2ᴺ·a_N·u and sin(2φ_{n−1} − φ_n) = (c_n/a_n)·sin φ_n lead to the amplitude φ₀; ℰ(u) = u·E/K + Σ c_n·sin φ_n
-    /// (Abramowitz and Stegun, 16.4, 17.4.37 and 17.6). The argument is the complement because it keeps its digits
-    /// for m near 1.
+    /// Computes the functions at m = 1 − `complement` < 1 (Abramowitz and Stegun, 16.4, 17.4.37 and 17.6).
     pub fn new(u: f64, complement: f64) -> Self {
         let m = 1.0 - complement;
         let (mut a, mut b, mut c) = (1.0, complement.sqrt(), m.max(0.0).sqrt());

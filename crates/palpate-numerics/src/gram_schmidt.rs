@@ -1,9 +1,8 @@
-//! Orthonormal bases by modified Gram–Schmidt (Golub and Van Loan, *Matrix Computations*, 5.2.8).
+//! Modified Gram–Schmidt (Golub and Van Loan, *Matrix Computations*, 5.2.8).
 
 use crate::small::{add_multiple, dot};
 
-/// Pushes the normalised component of a vector orthogonal to a basis of unit vectors. A component of at most the share `least` of the vector's
-/// length is ignored.
+/// Adds a normalised orthogonal component, if above the share `least`.
 ///
 /// ```
 /// use palpate_numerics::push_rest;

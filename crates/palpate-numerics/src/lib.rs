@@ -1,9 +1,4 @@
-//! Numerical methods for several crates, each with its source.
-//!
-//! [`small`] contains the algebra of matrices of a size known at compile time; [`Cholesky`] and [`SparseCholesky`] factor larger
-//! ones. [`regression`] fits smooth functions with their uncertainty. Statistics, distribution functions and elliptic
-//! functions are plain functions of this crate's root, and [`simd`] has the vectors for kernels.
-//! [`watch`] reports the progress of long work and can cancel it. [`OutOfRange`] is the error of a number outside its bound.
+//! Numerical methods.
 //!
 //! ```
 //! use palpate_numerics::{chi_squared_critical_value, chi_squared_survival, median, normal_interval_95};

@@ -1,4 +1,4 @@
-//! Checks of numbers against their bounds.
+//! Checks of bounds.
 
 /// Error of a number out of range.
 ///
@@ -20,26 +20,26 @@ pub struct OutOfRange {
 }
 
 impl OutOfRange {
-    /// Checks that numbers, each with its name, are greater than 0 and finite.
+    /// Checks for positive, finite numbers.
     ///
     /// # Errors
-    /// [`OutOfRange`] for the first number that fails.
+    /// [`OutOfRange`].
     pub fn check_positive(numbers: impl IntoIterator<Item = (&'static str, f64)>) -> Result<(), Self> {
         Self::check("greater than 0 and finite", numbers, |value| value > 0.0 && value.is_finite())
     }
 
-    /// Checks that numbers, each with its name, are at least 0 and finite.
+    /// Checks for non-negative, finite numbers.
     ///
     /// # Errors
-    /// [`OutOfRange`] for the first number that fails.
+    /// [`OutOfRange`].
     pub fn check_not_negative(numbers: impl IntoIterator<Item = (&'static str, f64)>) -> Result<(), Self> {
         Self::check("at least 0 and finite", numbers, |value| value >= 0.0 && value.is_finite())
     }
 
-    /// Checks that numbers, each with its name, are `good`; `bound` is the text of the condition.
+    /// Checks for `good` numbers; `bound` describes them.
     ///
     /// # Errors
-    /// [`OutOfRange`] for the first number that fails.
+    /// [`OutOfRange`].
     pub fn check(
         bound: &'static str,
         numbers: impl IntoIterator<Item = (&'static str, f64)>,

@@ -1,9 +1,9 @@
-//! A random order determined by a seed.
+//! Random permutations.
 
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// 0…count−1 in random order (Durstenfeld 1964).
+/// Random permutation of 0…count−1 (Durstenfeld 1964).
 pub fn random_order(count: usize, seed: u64) -> Vec<usize> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut order: Vec<usize> = (0..count).collect();

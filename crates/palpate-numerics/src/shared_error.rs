@@ -1,6 +1,6 @@
-//! Covariances of independent errors and one shared error, V = D + g·gᵀ with D diagonal.
+//! Covariances with a common-mode error, V = D + g·gᵀ with D diagonal.
 
-/// aᵀ·V⁻¹·b from `ab` = aᵀ·D⁻¹·b, `ga` = gᵀ·D⁻¹·a, `gb` = gᵀ·D⁻¹·b and `gg` = gᵀ·D⁻¹·g (Sherman and Morrison, Annals of Mathematical
+/// aᵀ·V⁻¹·b from `ab` = aᵀ·D⁻¹·b, `ga` = gᵀ·D⁻¹·a etc. (Sherman and Morrison, Annals of Mathematical
 /// Statistics 21, 1950).
 ///
 /// ```
@@ -15,7 +15,7 @@ pub fn with_shared_error(ab: f64, ga: f64, gb: f64, gg: f64) -> f64 {
     ab - ga * gb / (1.0 + gg)
 }
 
-/// Whitening of values with independent errors of unit variance and a shared error γ: V = I + γ·γᵀ.
+/// Whitening for V = I + γ·γᵀ.
 ///
 /// ```
 /// use palpate_numerics::SharedError;
@@ -33,12 +33,12 @@ pub struct SharedError {
 }
 
 impl SharedError {
-    /// The shared error γ of each value, over the standard deviation of the value's independent error.
+    /// Creates the whitening from relative loadings γ.
     pub fn new(gamma: Vec<f64>) -> Self {
         Self { square: gamma.iter().map(|error| error * error).sum(), gamma }
     }
 
-    /// Multiplies N columns of values by V^(−½) = I − (1 − 1/√(1 + γ·γ))·γ·γᵀ/(γ·γ).
+    /// Multiplies N columns by V^(−½) = I − (1 − 1/√(1 + γ·γ))·γ·γᵀ/(γ·γ).
     pub fn whiten<const N: usize>(&self, values: &mut [[f64; N]]) {
         if self.square > 0.0 {
             let share = (1.0 - (1.0 + self.square).sqrt().recip()) / self.square;

@@ -1,21 +1,17 @@
-//! Algebra of small matrices of a size known at compile time, without allocation: factors, solutions, inverses and
-//! determinants of symmetric matrices, principal axes, and the solution of a general system.
+//! Algebra of small matrices without allocation.
 
 /// A matrix by rows.
 pub type Matrix<const N: usize> = [[f64; N]; N];
 
-/// A pivot of at most this share of its original diagonal entry counts as rounding error.
+/// Largest relative pivot that is rounding.
 ///
-/// The matrices here have at most ten rows, and their entries are sums over some tens of channels. Each addition on the
-/// way to a pivot errs by up to ε/2 = 1.1·10⁻¹⁶ of the diagonal entry, in the worst case 45·ε together (Higham, *Accuracy and
-/// Stability of Numerical Algorithms*, 3.1 and 10.1). A smaller remainder has no correct digit. As a share, the bound does not
-/// depend on the units of the unknowns.
+/// Ten additions of sums over tens of channels err by up to 45·ε (Higham, *Accuracy and Stability of
+/// Numerical Algorithms*, 3.1 and 10.1).
 pub const ROUNDING: f64 = 1e-14;
 
-/// The factors of A = L·D·Lᵀ for a symmetric positive semidefinite matrix A: L lower triangular with a diagonal of ones,
-/// D diagonal. Only the lower triangle of A is read.
+/// A = L·D·Lᵀ for a symmetric positive semidefinite lower triangle.
 ///
-/// An unknown can be fixed at 0: it then has no pivot. The factors ignore its row and column, and it is 0 in every solution and inverse.
+/// A fixed unknown has no pivot, and is 0 in solutions and inverses.
 ///
 /// ```
 /// use palpate_numerics::small::Ldl;
@@ -27,24 +23,22 @@ pub const ROUNDING: f64 = 1e-14;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ldl<const N: usize> {
-    /// L below its diagonal; zeros above it.
+    /// L below the diagonal.
     lower: Matrix<N>,
     /// D; 0 for a fixed unknown.
     pivots: [f64; N],
-    /// 1/D; 0 for a fixed unknown.
     inverse_pivots: [f64; N],
 }
 
 #[expect(clippy::needless_range_loop, reason = "as the formulas have their indices")]
 impl<const N: usize> Ldl<N> {
-    /// The factors of a positive definite matrix; `None` where it is not positive definite, or only by [`ROUNDING`].
+    /// Factors a matrix; `None` unless positive definite, to [`ROUNDING`].
     #[inline]
     pub fn new(a: &Matrix<N>) -> Option<Self> {
         Self::of_free(a, [true; N])
     }
 
-    /// The factors of the rows and columns that are `free`, with the other unknowns fixed. The free part must be positive definite;
-    /// `None` where it is not, or only by [`ROUNDING`].
+    /// Factors the `free` part, with the rest fixed; `None` as [`Ldl::new`].
     #[inline]
     pub fn of_free(a: &Matrix<N>, free: [bool; N]) -> Option<Self> {
         let factors =
@@ -52,19 +46,19 @@ impl<const N: usize> Ldl<N> {
         (0..N).all(|k| !free[k] || factors.pivots[k] > 0.0).then_some(factors)
     }
 
-    /// The factors of a positive semidefinite matrix; an unknown that the matrix does not determine, to [`ROUNDING`], is fixed.
+    /// Factors a semidefinite matrix; undetermined unknowns are fixed.
     #[inline]
     pub fn semidefinite(a: &Matrix<N>) -> Self {
         Self::factor(a, |_, pivot, rounding| if pivot > rounding { pivot } else { 0.0 })
     }
 
-    /// The factors of a matrix that is positive definite except for rounding: every pivot is raised to at least [`ROUNDING`].
+    /// Factors with pivots raised to [`ROUNDING`].
     #[inline]
     pub fn regularised(a: &Matrix<N>) -> Self {
         Self::factor(a, |_, pivot, rounding| pivot.max(rounding))
     }
 
-    /// The factors of R·Rᵀ from its root R, lower triangular with a positive diagonal.
+    /// Factors R·Rᵀ from R.
     #[inline]
     pub fn of_root(root: &Matrix<N>) -> Self {
         let lower = std::array::from_fn(|i| std::array::from_fn(|j| root[i][j] / root[j][j]));
@@ -72,8 +66,8 @@ impl<const N: usize> Ldl<N> {
         Self { lower, pivots, inverse_pivots: pivots.map(f64::recip) }
     }
 
-    /// Factors row by row (Golub and Van Loan, *Matrix Computations*, 4.1.2). The arguments of `pivot_of` are the index of the pivot, its value
-    /// after elimination, and the rounding error of that value. It returns the pivot to use, or 0 to fix the unknown.
+    /// Golub and Van Loan, *Matrix Computations*, 4.1.2. `pivot_of(index, pivot, rounding)` returns the used
+    /// pivot.
     #[inline(always)]
     fn factor(a: &Matrix<N>, pivot_of: impl Fn(usize, f64, f64) -> f64) -> Self {
         let mut factors = Self { lower: [[0.0; N]; N], pivots: [0.0; N], inverse_pivots: [0.0; N] };
@@ -97,13 +91,13 @@ impl<const N: usize> Ldl<N> {
         factors
     }
 
-    /// 1/D; 0 for a fixed unknown.
+    /// 1/D; 0 if fixed.
     #[inline]
     pub fn inverse_pivots(&self) -> &[f64; N] {
         &self.inverse_pivots
     }
 
-    /// R = L·√D, so that A = R·Rᵀ; a column of zeros for a fixed unknown.
+    /// R = L·√D, so that A = R·Rᵀ.
     #[inline]
     pub fn root(&self) -> Matrix<N> {
         let roots = self.pivots.map(f64::sqrt);
@@ -135,13 +129,13 @@ impl<const N: usize> Ldl<N> {
         x
     }
 
-    /// The quadratic form bᵀ·A⁻¹·b.
+    /// bᵀ·A⁻¹·b.
     #[inline]
     pub fn quadratic(&self, b: [f64; N]) -> f64 {
         self.solve_lower(b).iter().zip(&self.inverse_pivots).map(|(y, inverse)| y * y * inverse).sum()
     }
 
-    /// A⁻¹ = L⁻ᵀ·D⁻¹·L⁻¹.
+    /// A⁻¹.
     #[inline]
     pub fn inverse(&self) -> Matrix<N> {
         let mut undone = [[0.0; N]; N];
@@ -163,13 +157,13 @@ impl<const N: usize> Ldl<N> {
         inverse
     }
 
-    /// det A over the unknowns that are not fixed.
+    /// det A without fixed unknowns.
     #[inline]
     pub fn determinant(&self) -> f64 {
         self.pivots.iter().filter(|pivot| **pivot != 0.0).product()
     }
 
-    /// ln det A over the unknowns that are not fixed.
+    /// ln det A without fixed unknowns.
     #[inline]
     pub fn log_determinant(&self) -> f64 {
         self.pivots.iter().filter(|pivot| **pivot != 0.0).map(|pivot| pivot.ln()).sum()
@@ -188,7 +182,7 @@ pub fn add_multiple(a: &mut [f64], factor: f64, b: &[f64]) {
     a.iter_mut().zip(b).for_each(|(a, b)| *a += factor * b);
 }
 
-/// The bilinear form aᵀ·M·b.
+/// aᵀ·M·b.
 #[inline]
 pub fn form<const N: usize>(a: &[f64; N], matrix: &Matrix<N>, b: &[f64; N]) -> f64 {
     a.iter().zip(matrix).map(|(a, row)| a * dot(row, b)).sum()
@@ -203,25 +197,23 @@ pub fn add_outer<const N: usize>(a: &mut Matrix<N>, weight: f64, j: &[f64; N]) {
     }
 }
 
-/// The eigenvalues of the covariance [[xx, xy], [xy, yy]], given as xx, xy and yy: the variances along its principal axes,
-/// the larger one first, at least 0.
+/// Eigenvalues of [[xx, xy], [xy, yy]], descending, ≥ 0.
 #[inline]
 pub fn principal_variances([xx, xy, yy]: [f64; 3]) -> [f64; 2] {
     let (mean, radius) = (0.5 * (xx + yy), (0.5 * (xx - yy)).hypot(xy));
     [mean + radius, (mean - radius).max(0.0)]
 }
 
-/// The direction of the larger of the [`principal_variances`], of length 1.
+/// Eigenvector of the larger eigenvalue.
 #[inline]
 pub fn principal_direction([xx, xy, yy]: [f64; 3]) -> [f64; 2] {
     let (sin, cos) = (0.5 * xy.atan2(0.5 * (xx - yy))).sin_cos();
     [cos, sin]
 }
 
-/// The solution of A·x = b for any matrix A; not finite for a singular one.
+/// Solves A·x = b; not finite if singular.
 ///
-/// One correction from the residual makes elimination exact for equations near the given ones: to rounding, entry by entry,
-/// for any size of each entry (Skeel, Math. Comp. 35, 1980).
+/// One correction makes it exact to rounding (Skeel, Math. Comp. 35, 1980).
 pub fn solve_general<const N: usize>(a: &Matrix<N>, b: &[f64; N]) -> [f64; N] {
     let solution = eliminated(*a, *b);
     let left_over = std::array::from_fn(|i| b[i] - dot(&a[i], &solution));
@@ -229,7 +221,7 @@ pub fn solve_general<const N: usize>(a: &Matrix<N>, b: &[f64; N]) -> [f64; N] {
     std::array::from_fn(|i| solution[i] + correction[i])
 }
 
-/// The solution by elimination with the largest pivot, after scaling the rows to equal size.
+/// Gaussian elimination with row scaling and partial pivoting.
 fn eliminated<const N: usize>(mut a: Matrix<N>, mut b: [f64; N]) -> [f64; N] {
     for (row, right) in a.iter_mut().zip(&mut b) {
         let size = row.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
@@ -261,7 +253,7 @@ mod tests {
     use ndarray::Array2;
     use proptest::prelude::*;
 
-    /// R·Rᵀ for a lower triangular R with a diagonal from 0.1 to 2.
+    /// R·Rᵀ with a diagonal of R from 0.1 to 2.
     fn positive_definite() -> impl Strategy<Value = Matrix<4>> {
         proptest::array::uniform16(-1.0..1.0f64).prop_map(|numbers| {
             let root = |i: usize, j: usize| match i.cmp(&j) {

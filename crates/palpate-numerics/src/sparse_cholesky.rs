@@ -1,13 +1,9 @@
-//! Cholesky factorisation A = L·Lᵀ of a sparse symmetric positive definite matrix, by the multifrontal method (Duff and Reid,
-//! *The multifrontal solution of indefinite sparse symmetric linear equations*, 1983; Liu, *The multifrontal method for sparse
-//! matrix solution: theory and practice*, 1992).
+//! Multifrontal sparse Cholesky factorisation (Duff and Reid, *The multifrontal solution of indefinite sparse
+//! symmetric linear equations*, 1983; Liu, *The multifrontal method for sparse matrix solution: theory and
+//! practice*, 1992), in the order of columns.
 //!
-//! Consecutive columns of L with nearly the same pattern are a supernode. It is eliminated in a small dense matrix, its front, with that pattern
-//! for rows and columns. The front is the sum of its columns of A and the update matrices of its children. The first columns are factored.
-//! The effect of these columns on the other ones is the update matrix for the parent, the supernode of the first remaining row. So nearly all
-//! multiply-adds are in products of dense matrices.
-//!
-//! Columns are eliminated in their order in A. The caller chooses an order that keeps L sparse, such as nested dissection.
+//! Supernodes, columns of similar pattern, are eliminated in dense fronts: their columns of A plus update
+//! matrices of their children.
 
 use std::mem;
 use std::ops::Range;
@@ -18,24 +14,21 @@ use ndarray::{ArrayView2, ArrayViewMut2};
 use super::cholesky::factor_leading;
 use super::watch::{Cancelled, Watch};
 
-/// Largest number of columns of L in one panel.
 const PANEL: usize = 64;
 
-/// A supernode with fewer columns merges with its parent's next column even when a share of up to [`MOST_ZEROS`] of the stored entries
-/// becomes zeros: larger fronts are worth that.
+/// Smaller supernodes merge up to [`MOST_ZEROS`], as larger fronts are faster.
 const SMALL: usize = 48;
 const MOST_ZEROS: f64 = 0.2;
 
-/// Largest share of zeros in larger supernodes, as [`MOST_ZEROS`].
+/// Share of zeros in larger supernodes.
 const FEW_ZEROS: f64 = 0.02;
 
-/// Name of the stage, for the watch.
 const STAGE: &str = "factoring the equations";
-/// Columns in the search for patterns, and multiply-adds of a solution, between two checks of the watch: some milliseconds.
+/// Work between checks of the watch.
 const COLUMNS_EACH: usize = 1 << 10;
 const PRODUCTS_EACH: usize = 1 << 23;
 
-/// A symmetric matrix that grows by columns: its elements on and below the diagonal.
+/// Lower triangle of a sparse symmetric matrix.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SparseSymmetric {
     column_starts: Vec<usize>,
@@ -43,43 +36,36 @@ pub struct SparseSymmetric {
     values: Vec<f64>,
 }
 
-/// The factor L of A = L·Lᵀ, lower triangular and sparse, computed by one thread.
+/// The sparse factor L of A = L·Lᵀ.
 pub struct SparseCholesky {
     size: usize,
     panels: Vec<Panel>,
-    /// The entries of the panels, one panel after the other.
     values: Vec<f64>,
 }
 
-/// Columns of L, dense and row by row: first the square on the diagonal, then the rows below it that are not 0.
+/// Row by row: a square, then the nonzero rows below.
 struct Panel {
     columns: Range<usize>,
     below: Vec<usize>,
-    /// Index of the panel's first entry.
+    /// Index in the values.
     start: usize,
 }
 
-/// Columns that are eliminated together.
 struct Supernode {
     columns: Range<usize>,
-    /// Rows and columns of the front, ascending: the supernode's own, then those below.
+    /// Rows, ascending.
     pattern: Vec<usize>,
-    /// Stored elements below the diagonal of the supernode's columns of L that are known to be 0.
+    /// Stored zeros.
     zeros: usize,
 }
 
-/// The update matrices for fronts that are not yet assembled.
 struct Fronts<'a> {
-    /// Updates by the first row of their pattern.
     waiting: Vec<Vec<Update<'a>>>,
-    /// The place of each row of the matrix in the present front.
     places: Vec<usize>,
 }
 
-/// Update of later rows and columns by the elimination of a supernode.
 struct Update<'a> {
     pattern: &'a [usize],
-    /// The lower triangle, row by row.
     triangle: Vec<f64>,
 }
 
@@ -89,22 +75,22 @@ pub enum SparseCholeskyError {
     /// The matrix is not positive definite.
     #[error("a sparse matrix of {size} rows is not positive definite: a pivot is not greater than 0")]
     NotPositiveDefinite {
-        /// Rows of the matrix.
+        /// Size of the matrix.
         size: usize,
     },
-    /// The factor does not fit into memory.
+    /// The factor is too large for the memory.
     #[error("the factor of a sparse matrix of {size} rows does not fit into memory")]
     OutOfMemory {
-        /// Rows of the matrix.
+        /// Size of the matrix.
         size: usize,
     },
-    /// The watch stopped the work.
+    /// The watch cancelled the work.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
 
 impl SparseSymmetric {
-    /// A matrix without columns, with room for `elements` elements.
+    /// Creates an empty matrix.
     pub fn with_capacity(elements: usize) -> Self {
         Self {
             column_starts: vec![0],
@@ -113,8 +99,7 @@ impl SparseSymmetric {
         }
     }
 
-    /// Adds the next column: row and value of its elements. Elements above the diagonal are ignored, because their mirror images
-    /// are in earlier columns.
+    /// Appends a column; elements above the diagonal are ignored.
     pub fn push_column(&mut self, elements: impl IntoIterator<Item = (usize, f64)>) {
         let column = self.size();
         for (row, value) in elements.into_iter().filter(|(row, _)| *row >= column) {
@@ -135,21 +120,21 @@ impl SparseSymmetric {
 }
 
 impl SparseCholesky {
-    /// Factors `matrix`.
+    /// Factors a matrix.
     ///
     /// # Errors
-    /// [`SparseCholeskyError`] when it is not positive definite, or too large.
+    /// [`SparseCholeskyError`].
     ///
     /// # Panics
-    /// When the row of an element is beyond the last column.
+    /// For a row beyond the last column.
     pub fn new(matrix: &SparseSymmetric) -> Result<Self, SparseCholeskyError> {
         Self::new_watched(matrix, Watch::NONE)
     }
 
-    /// Factors `matrix`, watched: the watch can stop the work after each supernode.
+    /// Factors, watched.
     ///
     /// # Errors
-    /// The errors of [`SparseCholesky::new`], and [`SparseCholeskyError::Cancelled`].
+    /// As [`SparseCholesky::new`], or cancelled.
     ///
     /// # Panics
     /// As [`SparseCholesky::new`].
@@ -177,20 +162,19 @@ impl SparseCholesky {
         Ok(factor)
     }
 
-    /// Replaces b by the solution x of A·x = b. Several b, one after the other, are solved in one sweep through the factor: the time of
-    /// a sweep for one b is that of reading the factor from memory.
+    /// Replaces consecutive right-hand sides b by A⁻¹·b in one sweep.
     ///
     /// # Panics
-    /// When the length of b is not a multiple of the matrix size.
+    /// For an incomplete b.
     pub fn solve_in_place(&self, b: &mut [f64]) {
         let done = self.solve_in_place_watched(b, Watch::NONE);
         debug_assert_eq!(done, Ok(()), "the watch does not stop it");
     }
 
-    /// Solves as [`SparseCholesky::solve_in_place`], watched; b is not a solution after a stop.
+    /// Solves, watched.
     ///
     /// # Errors
-    /// [`Cancelled`] when the watch stopped it.
+    /// [`Cancelled`]; b is then undefined.
     ///
     /// # Panics
     /// As [`SparseCholesky::solve_in_place`].
@@ -225,12 +209,11 @@ impl SparseCholesky {
         Ok(())
     }
 
-    /// Number of stored entries of L, including some zeros.
+    /// Stored entries of L.
     pub fn stored_numbers(&self) -> usize {
         self.values.len()
     }
 
-    /// Keeps the factored columns of a front.
     fn store(&mut self, node: &Supernode, front: &[f64]) {
         for own in node.panels() {
             let first = node.columns.start;
@@ -245,7 +228,6 @@ impl SparseCholesky {
         }
     }
 
-    /// The square on the diagonal of a panel, and the rows below it.
     fn blocks(&self, panel: &Panel) -> (&[f64], ArrayView2<'_, f64>) {
         let (width, height) = (panel.columns.len(), panel.below.len());
         let (square, below) = self.values[panel.start..].split_at(width * width);
@@ -253,10 +235,9 @@ impl SparseCholesky {
         (square, below.expect("rows as long as the panel is wide"))
     }
 
-    /// Computes the panel's columns of L⁻¹·x, in place.
     fn solve_lower(&self, panel: &Panel, count: usize, x: &mut [f64]) {
         let own = &mut x[panel.columns.start * count..panel.columns.end * count];
-        // A load at a few places affects few of the panels.
+        // A sparse load affects few panels.
         if own.iter().all(|x| *x == 0.0) {
             return;
         }
@@ -278,7 +259,6 @@ impl SparseCholesky {
         }
     }
 
-    /// Computes the panel's rows of L⁻ᵀ·x, in place.
     fn solve_upper(&self, panel: &Panel, count: usize, x: &mut [f64]) {
         let width = panel.columns.len();
         let (square, below) = self.blocks(panel);
@@ -302,12 +282,11 @@ impl SparseCholesky {
 }
 
 impl Supernode {
-    /// Rows below the supernode's columns.
     fn below(&self) -> &[usize] {
         &self.pattern[self.columns.len()..]
     }
 
-    /// Merges the next column, which adds `rows` to the pattern, unless too many stored entries would be zeros.
+    /// Merges the next column, unless too many zeros result.
     fn take_in(&mut self, rows: &[usize]) -> bool {
         let width = self.columns.len();
         let zeros = self.zeros + width * rows.len();
@@ -324,7 +303,6 @@ impl Supernode {
         taken
     }
 
-    /// The supernode's columns in the front, in panels.
     fn panels(&self) -> impl Iterator<Item = Range<usize>> {
         let width = self.columns.len();
         (0..width).step_by(PANEL).map(move |start| start..width.min(start + PANEL))
@@ -335,14 +313,13 @@ impl Supernode {
     }
 }
 
-/// The supernodes of a matrix. A supernode merges with the next column when that is the first row below it, and when it then
-/// stores few zeros (relaxed supernodes: Ashcraft and Grimes, *The influence of relaxed supernode partitions on the multifrontal
-/// method*, 1989).
+/// Relaxed supernodes (Ashcraft and Grimes, *The influence of relaxed supernode partitions on the
+/// multifrontal method*, 1989).
 fn supernodes(matrix: &SparseSymmetric, watch: Watch) -> Result<Vec<Supernode>, Cancelled> {
     let mut supernodes: Vec<Supernode> = Vec::new();
-    // The children of each column: the supernodes with it as their first row below.
+    // Supernodes by their first row below.
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); matrix.size()];
-    // The last supernode so far with each row in its pattern.
+    // The last supernode with each row in its pattern.
     let mut owner = vec![usize::MAX; matrix.size()];
     for column in 0..matrix.size() {
         if column % COLUMNS_EACH == 0 {
@@ -380,8 +357,6 @@ impl<'a> Fronts<'a> {
         Self { waiting: (0..size).map(|_| Vec::new()).collect(), places: vec![0; size] }
     }
 
-    /// Writes the lower triangle of a supernode's front before its elimination: the sum of its columns of the matrix and the update
-    /// matrices of its children.
     fn assemble(&mut self, matrix: &SparseSymmetric, node: &Supernode, front: &mut [f64]) {
         let size = node.pattern.len();
         for (place, row) in node.pattern.iter().enumerate() {
@@ -400,7 +375,6 @@ impl<'a> Fronts<'a> {
         }
     }
 
-    /// Adds an update matrix to a front of `size` rows.
     fn extend_add(&self, update: &Update, size: usize, front: &mut [f64]) {
         let places: Vec<usize> = update.pattern.iter().map(|row| self.places[*row]).collect();
         let mut triangle = &update.triangle[..];
@@ -414,7 +388,6 @@ impl<'a> Fronts<'a> {
         }
     }
 
-    /// Keeps the update that remains after the elimination of a supernode; `None` when memory is insufficient.
     fn keep_update(&mut self, node: &'a Supernode, front: &[f64]) -> Option<()> {
         let (size, width) = (node.pattern.len(), node.columns.len());
         let Some(parent) = node.below().first() else { return Some(()) };
@@ -427,14 +400,12 @@ impl<'a> Fronts<'a> {
     }
 }
 
-/// x ← x − factor·y.
 fn subtract_multiple(x: &mut [f64], factor: f64, y: &[f64]) {
     for (x, y) in x.iter_mut().zip(y) {
         *x -= factor * y;
     }
 }
 
-/// An empty list with room for `count` numbers, if there is memory for them.
 fn room(count: usize) -> Option<Vec<f64>> {
     let mut values = Vec::new();
     values.try_reserve_exact(count).ok()?;
@@ -451,7 +422,7 @@ mod tests {
     use super::*;
     use crate::Cholesky;
 
-    /// A symmetric matrix with a dominant diagonal, sparse and dense; about one element in `rarity` is not 0.
+    /// Diagonally dominant, sparse and dense; one in `rarity` elements is not 0.
     fn matrices(elements: &[f64], rarity: usize) -> (SparseSymmetric, Array2<f64>) {
         let size = elements.len();
         let element = |i: usize, j: usize| match (i.min(j), i.max(j)) {
@@ -472,7 +443,6 @@ mod tests {
     }
 
     impl SparseCholesky {
-        /// L, dense.
         fn lower(&self) -> Array2<f64> {
             let mut lower = Array2::zeros((self.size, self.size));
             for panel in &self.panels {
@@ -573,7 +543,7 @@ mod tests {
 
     #[test]
     fn a_factor_too_large_for_memory_is_refused() {
-        // An arrow matrix fills completely when its shaft is eliminated first, and not at all when it is eliminated last.
+        // An arrow matrix fills completely when its shaft is eliminated first.
         let size = 3_000_000;
         let mut matrix = SparseSymmetric::with_capacity(2 * size);
         matrix.push_column((0..size).map(|row| (row, 1.0)));

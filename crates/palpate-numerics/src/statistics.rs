@@ -1,29 +1,29 @@
-//! Means, variances, percentiles.
+//! Means, variances, quantiles.
 
-/// The mean; NaN for no values.
+/// Mean; NaN for no values.
 pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     let (sum, count) = values.into_iter().fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
     sum / count
 }
 
-/// The mean, and the mean square of the differences from it.
+/// Mean, and mean square of the differences from it.
 pub fn mean_and_variance<I: Iterator<Item = f64> + Clone>(values: I) -> (f64, f64) {
     let middle = mean(values.clone());
     (middle, mean(values.map(|value| (value - middle).powi(2))))
 }
 
-/// The standard error of the mean, √(Σ(v − mean)²/(n − 1)/n); 0 for a single value.
+/// Standard error of the mean; 0 for a single value.
 pub fn standard_error(values: &[f64]) -> f64 {
     let (_, variance) = mean_and_variance(values.iter().copied());
     (variance / (values.len() as f64 - 1.0).max(1.0)).sqrt()
 }
 
-/// √ of the mean square.
+/// Root mean square.
 pub fn root_mean_square(values: &[f64]) -> f64 {
     mean(values.iter().map(|value| value * value)).sqrt()
 }
 
-/// The `percent`-th percentile of ascending values, with linear interpolation; `None` for no values.
+/// Percentile of ascending values, interpolated; `None` for no values.
 pub fn percentile(sorted: &[f64], percent: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let place = percent.clamp(0.0, 100.0) / 100.0 * last as f64;
@@ -32,31 +32,28 @@ pub fn percentile(sorted: &[f64], percent: f64) -> Option<f64> {
     Some(low + (high - low) * place.fract())
 }
 
-/// The median of values in any order; `None` for no values.
+/// Median; `None` for no values.
 pub fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     percentile(&values, 50.0)
 }
 
-/// Smallest number of errors that bound a 95 % interval: [`conformal_95`] is `None` for fewer.
+/// Smallest number of errors for [`conformal_95`].
 pub const FEWEST_FOR_95: usize = 19;
 
-/// The ⌈0.95·(n + 1)⌉-th smallest of n absolute errors: a further exchangeable one does not exceed it with probability at least 0.95. `None` for
-/// fewer than [`FEWEST_FOR_95`]. Vovk, Gammerman and Shafer, *Algorithmic Learning in a Random World* (2005).
+/// ⌈0.95·(n + 1)⌉-th smallest of n absolute errors, a 95 % bound; `None` below [`FEWEST_FOR_95`] (Vovk,
+/// Gammerman and Shafer, *Algorithmic Learning in a Random World*, 2005).
 pub fn conformal_95(mut sizes: Vec<f64>) -> Option<f64> {
     sizes.sort_by(f64::total_cmp);
     let number = (0.95 * (sizes.len() + 1) as f64).ceil() as usize;
     sizes.get(number.checked_sub(1)?).copied()
 }
 
-/// Bound of absolute errors that come in groups: an error of a further group does not exceed it with a probability of about 0.95. `None` for
-/// fewer than [`FEWEST_FOR_95`] groups, and for an empty group.
+/// 95 % bound of absolute errors of a further group; `None` below [`FEWEST_FOR_95`] groups.
 ///
-/// Every group has the same weight, and shares it between its errors: their distribution is the mean of the groups' distributions (Dunn,
-/// Wasserman and Ramdas, *Journal of the American Statistical Association* 118, 2023: pooled CDFs). For n independent errors the bound is their
-/// quantile at 0.95·(n + 1)/n, as in [`conformal_95`]. Errors of one group may be correlated. Therefore n is the effective sample size: the mean of
-/// n independent errors would scatter as the mean of the groups does (Kish, *Survey Sampling*, 1965). It is at least the number of groups.
-/// Quantiles are interpolated between errors (Hutson, *Statistics and Probability Letters* 42, 1999).
+/// Groups have equal weights (Dunn, Wasserman and Ramdas, *Journal of the American Statistical Association*
+/// 118, 2023). The bound is the interpolated quantile at 0.95·(n + 1)/n (Hutson, *Statistics and Probability
+/// Letters* 42, 1999), n the effective sample size (Kish, *Survey Sampling*, 1965).
 pub fn conformal_95_of_groups(groups: &[&[f64]]) -> Option<f64> {
     const SHARE: f64 = 0.95;
     if groups.len() < FEWEST_FOR_95 || groups.iter().any(|group| group.is_empty()) {
@@ -77,13 +74,13 @@ pub fn conformal_95_of_groups(groups: &[&[f64]]) -> Option<f64> {
     Some(weighted_quantile(&sizes, SHARE * (1.0 + 1.0 / independent)))
 }
 
-/// Quantile of ascending values with weights that add up to 1, by linear interpolation between the cumulated weights.
+/// Quantile of ascending values with weights of sum 1.
 fn weighted_quantile(values: &[(f64, f64)], share: f64) -> f64 {
     let (mut cumulated, mut below) = (0.0, f64::NAN);
     for (value, weight) in values {
         if cumulated + weight >= share {
             let part = (share - cumulated) / weight;
-            // Equal values, also immense ones, need no interpolation.
+            // Equal values need no interpolation, and could overflow.
             return if *value > below { below + part * (value - below) } else { *value };
         }
         (cumulated, below) = (cumulated + weight, *value);
@@ -105,7 +102,7 @@ mod tests {
         let repeated: Vec<Vec<f64>> = sizes.iter().map(|size| vec![*size; 7]).collect();
         let repeated: Vec<&[f64]> = repeated.iter().map(Vec::as_slice).collect();
         assert!((bound(&repeated) - bound(&single)).abs() < 1.0);
-        // The errors of groups with the same values are independent.
+        // The errors of groups with equal values are independent.
         let thousand: Vec<f64> = (1..=1000).map(f64::from).collect();
         assert!((bound(&[thousand.as_slice(); 20]) - 950.0).abs() < 1.0);
         assert_eq!(conformal_95_of_groups(&single[..18]), None);

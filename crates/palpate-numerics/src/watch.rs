@@ -1,44 +1,44 @@
 //! Progress and cancellation of long work.
 
-/// Progress that long work reports.
+/// Progress of long work.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Progress {
-    /// One more round of an iteration: an epoch, a step, a fold.
+    /// An iteration.
     Round,
-    /// A stage of the work, and its completed share, 0 to 1.
+    /// A stage.
     Stage {
         /// Name of the stage.
         name: &'static str,
-        /// The completed share; NaN where it is unknown.
+        /// Completed share, 0 to 1, or NaN.
         share: f64,
     },
-    /// A stage that counts items, so that a rate can be shown.
+    /// A stage that counts items.
     Counted {
         /// Name of the stage.
         name: &'static str,
-        /// Name of the items, in the plural: "positions".
+        /// Plural name of the items.
         unit: &'static str,
-        /// Number of completed items.
+        /// Completed items.
         done: usize,
-        /// Number of all items.
+        /// All items.
         of: usize,
     },
 }
 
-/// Error of work that the watch stopped; a caller may keep the results up to then.
+/// Error of cancelled work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("stopped before it was finished")]
 pub struct Cancelled;
 
 impl Cancelled {
-    /// True when an error comes from stopped work, at any depth of its chain of sources.
+    /// True for an error caused by [`Cancelled`].
     pub fn caused(error: &(dyn std::error::Error + 'static)) -> bool {
         let mut causes = std::iter::successors(Some(error), |error| error.source());
         causes.any(|error| error.is::<Self>())
     }
 }
 
-/// Observes long work from any of its threads, and may stop it.
+/// Observer of long work, which may cancel it.
 ///
 /// ```
 /// use palpate_numerics::watch::{Cancelled, Watch};
@@ -54,18 +54,18 @@ pub struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// No observer: the work runs to its end.
+    /// No observer.
     pub const NONE: Watch<'static> = Watch { observe: None };
 
-    /// Calls `observe` often with the progress; the work stops when it returns `false`.
+    /// Creates a watch; `observe` returns `false` to cancel.
     pub fn new(observe: &'a (dyn Fn(Progress) -> bool + Sync)) -> Self {
         Self { observe: Some(observe) }
     }
 
-    /// Reports one more round.
+    /// Reports an iteration.
     ///
     /// # Errors
-    /// [`Cancelled`] when the work is to stop.
+    /// [`Cancelled`].
     pub fn round(&self) -> Result<(), Cancelled> {
         self.report(Progress::Round)
     }
@@ -73,15 +73,15 @@ impl<'a> Watch<'a> {
     /// Reports the completed share of a stage.
     ///
     /// # Errors
-    /// [`Cancelled`] when the work is to stop.
+    /// [`Cancelled`].
     pub fn stage(&self, name: &'static str, share: f64) -> Result<(), Cancelled> {
         self.report(Progress::Stage { name, share })
     }
 
-    /// Reports the number of completed items of a stage: `watch.counted("all over the surface", "positions", done, of)`.
+    /// Reports the completed items of a stage.
     ///
     /// # Errors
-    /// [`Cancelled`] when the work is to stop.
+    /// [`Cancelled`].
     pub fn counted(
         &self,
         name: &'static str,
@@ -92,10 +92,10 @@ impl<'a> Watch<'a> {
         self.report(Progress::Counted { name, unit, done, of })
     }
 
-    /// Reports any progress.
+    /// Reports progress.
     ///
     /// # Errors
-    /// [`Cancelled`] when the work is to stop.
+    /// [`Cancelled`].
     pub fn report(&self, progress: Progress) -> Result<(), Cancelled> {
         match self.observe {
             Some(observe) if !observe(progress) => Err(Cancelled),

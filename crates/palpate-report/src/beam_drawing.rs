@@ -1,4 +1,4 @@
-//! A beam on its bench as SVG text: supports, sensors, load and the deflected shape.
+//! Drawing of a loaded beam as SVG text.
 
 use super::drawing::axis::plain;
 use super::drawing::geometry::{Point, Rect};
@@ -9,30 +9,29 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::{Beam, BeamSection, BeamSupportKind, SupportedBeam, Surface};
 
-/// Position of the drawn load, as a share of the length: off the middle, so that the shape is visibly asymmetric.
+/// Position of the drawn load, as a share of the length: off the middle, so that the shape is
+/// visibly asymmetric.
 const DRAWN_LOAD: f64 = 0.35;
-/// Positions of the drawn load on a beam on any supports; the one where it bends the beam most is used.
+/// Candidate positions on a beam on any supports; the one with the largest bending is used.
 const DRAWN_LOADS: [f64; 5] = [DRAWN_LOAD, 0.2, 0.5, 0.65, 0.8];
-/// Points of the drawn shape.
 const SHAPE_STEPS: u32 = 200;
 
 const MARGIN: f64 = 40.0;
 const FONT_SIZE: f64 = 12.0;
-/// Middle of the force label, and the tail of its arrow.
+/// Middle of the force label, and the tail of the arrow.
 const LOAD_LABEL_Y: f64 = 20.0;
 const ARROW_TAIL_Y: f64 = 34.0;
-/// Middle of the undeflected beam.
 const BEAM_Y: f64 = 92.0;
 const BEAM_HALF_THICKNESS: f64 = 3.0;
-/// Half the drawn thickness of the thickest stretch of a stepped beam, and the least for any stretch.
+/// Half the drawn thickness of the thickest stretch of a stepped beam, and the least for any
+/// stretch.
 const STEPPED_HALF_THICKNESS: (f64, f64) = (5.5, 1.2);
-/// Room beneath the beam for the deflected shape, at its deepest.
+/// Room for the deflected shape.
 const DEFLECTION_ROOM: f64 = 56.0;
-/// Exaggeration factors are one of these times a power of ten.
 const ROUND: [f64; 10] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
 const SUPPORT_HEIGHT: f64 = 22.0;
 const SUPPORT_HALF_WIDTH: f64 = 12.0;
-/// Height of the ground of springs: beneath the beam at its deepest.
+/// Height of the ground of springs.
 const SPRING_GROUND_Y: f64 = BEAM_Y + DEFLECTION_ROOM + 10.0;
 const PROBE_TOP: f64 = 164.0;
 const PROBE_HEIGHT: f64 = 18.0;
@@ -40,18 +39,16 @@ const PROBE_HALF_WIDTH: f64 = 4.5;
 const NUMBER_TOP: f64 = 186.0;
 const NUMBER_LINE: f64 = 16.0;
 const NUMBER_SIZE: f64 = 11.0;
-/// Room for the dimension line, and for the remark beneath it.
 const DIMENSION_LINE: f64 = 30.0;
 const REMARK_LINE: f64 = 26.0;
 
-/// The beam bent by `force_n` newtons, its supports and sensors; and the position of the drawn force.
 pub(super) fn beam_drawing(beam: &Beam, layout: &Layout, force_n: f64) -> (BeamDrawing, Position) {
     let supports = [0.0, beam.length_m()].map(|at_m| (at_m * 1e3, BeamSupportKind::Simple)).to_vec();
     let load = Position::along(DRAWN_LOAD * beam.length_m());
     (BeamDrawing { supports, ..BeamDrawing::new(beam, layout, load, force_n) }, load)
 }
 
-/// The beam on any supports, bent by `force_n` newtons; and the position of the drawn force.
+/// Draws a beam on any supports, bent by `force_n`; also returns the position of the force.
 pub(super) fn supported_beam_drawing(
     beam: &SupportedBeam,
     layout: &Layout,
@@ -70,27 +67,25 @@ pub(super) fn supported_beam_drawing(
     (drawing, load)
 }
 
-/// Drawing of a loaded beam. Positions are from the left end of the beam; a position beyond an end, by a rounding error, is drawn at
-/// the end.
+/// Drawing of a loaded beam. Positions are from the left end and clamped to the ends.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct BeamDrawing {
     pub length_mm: f64,
-    /// Position and kind of each support.
+    /// Position in millimetres and kind.
     pub supports: Vec<(f64, BeamSupportKind)>,
-    /// End and thickness, in millimetres, of each stretch, from left to right; empty for a beam with one thickness.
+    /// End and thickness of each stretch, in millimetres, from left to right; empty for one
+    /// thickness.
     pub steps: Vec<(f64, f64)>,
-    /// Position of each sensor; they are numbered from 1 in this order.
     pub sensors_mm: Vec<f64>,
     pub load_mm: f64,
-    /// Label above the arrow of the load: "3 N".
     pub load_label: String,
-    /// Deflected shape as (position, deflection), both in millimetres and downward negative.
+    /// (position, deflection) in millimetres; downward deflections are negative.
     pub deflection_mm: Vec<(f64, f64)>,
     pub width_px: u32,
 }
 
 impl BeamDrawing {
-    /// The beam bent by a load, with its sensors but without supports.
+    /// A drawing without supports.
     fn new(beam: &dyn Surface, layout: &Layout, load: Position, force_n: f64) -> Self {
         // By reciprocity the bent shape is the influence function of the deflection under the load.
         let bent = beam.influence_function(SensorKind::Deflection, load);
@@ -110,8 +105,8 @@ impl BeamDrawing {
         }
     }
 
-    /// The drawing as one self-contained SVG document. The deflected shape is exaggerated by a round factor, which the drawing states
-    /// together with the beam's length and the largest deflection, both in millimetres.
+    /// Returns a self-contained SVG document. It states the beam's length, the largest deflection,
+    /// both in mm, and the round factor of exaggeration.
     pub fn svg(&self) -> String {
         let frame = Frame::new(self);
         let (numbers, number_rows) = number_labels(self, &frame);
@@ -130,15 +125,13 @@ impl BeamDrawing {
     }
 }
 
-/// Mapping from millimetres to pixels.
 struct Frame {
     width: f64,
     length_mm: f64,
     px_per_mm: f64,
     exaggeration: f64,
-    /// The point of the largest deflection in millimetres; `None` for a beam without deflection.
+    /// Position of the largest deflection in mm; `None` without deflection.
     deepest: Option<(f64, f64)>,
-    /// The deflected shape in pixels.
     shape: Vec<Point>,
 }
 
@@ -166,7 +159,6 @@ impl Frame {
         (self.across(position_mm), BEAM_Y - deflection_mm * self.px_per_mm * self.exaggeration)
     }
 
-    /// Height of the deflected shape at `across`, or of the straight beam if no shape is given.
     fn surface_y(&self, across: f64) -> f64 {
         let around = self.shape.windows(2).find(|ends| (ends[0].0..=ends[1].0).contains(&across));
         around.map_or(BEAM_Y, |ends| {
@@ -175,7 +167,7 @@ impl Frame {
         })
     }
 
-    /// A text in one line around `middle`, moved and cut so that it stays inside the image.
+    /// Centres a line of text, moved and cut so that it stays inside the image.
     fn centred(&self, text: &str, (middle, y): Point, size: f64, colour: Colour) -> Label {
         let text = text::fit(text, size, self.width - 16.0);
         let half = text::width(&text, size) / 2.0;
@@ -184,13 +176,13 @@ impl Frame {
     }
 }
 
-/// The largest round factor that is not above `most`.
+/// Returns the largest round factor not above `most`.
 fn round_below(most: f64) -> f64 {
     let decade = 10_f64.powf(most.log10().floor());
     ROUND.into_iter().rev().map(|factor| factor * decade).find(|&factor| factor <= most).unwrap_or(decade)
 }
 
-/// The sensors' numbers, in as many rows as keep them apart; and the number of rows.
+/// Numbers the sensors in as many rows as keep them apart; also returns the number of rows.
 fn number_labels(drawing: &BeamDrawing, frame: &Frame) -> (Vec<Label>, usize) {
     let mut rows = text::Rows::default();
     let label = |(index, &position_mm): (usize, &f64)| {
@@ -205,7 +197,6 @@ fn number_labels(drawing: &BeamDrawing, frame: &Frame) -> (Vec<Label>, usize) {
     (labels, rows.count())
 }
 
-/// Draws the probes, which stand beneath the beam and touch it.
 fn draw_sensors(svg: &mut Svg, drawing: &BeamDrawing, frame: &Frame) {
     let colour = palette(2);
     for &position_mm in &drawing.sensors_mm {
@@ -216,7 +207,6 @@ fn draw_sensors(svg: &mut Svg, drawing: &BeamDrawing, frame: &Frame) {
     }
 }
 
-/// Half the drawn thickness of the stretch that contains a position.
 fn half_thickness(drawing: &BeamDrawing, position_mm: f64) -> f64 {
     let thickest_mm = drawing.steps.iter().map(|step| step.1).fold(0.0, f64::max);
     let (largest, least) = STEPPED_HALF_THICKNESS;
@@ -226,7 +216,6 @@ fn half_thickness(drawing: &BeamDrawing, position_mm: f64) -> f64 {
     }
 }
 
-/// Draws the beam without a load.
 fn draw_beam(svg: &mut Svg, drawing: &BeamDrawing, frame: &Frame) {
     let mut left = MARGIN;
     let ends_mm = drawing.steps.iter().map(|step| step.0);
@@ -237,7 +226,6 @@ fn draw_beam(svg: &mut Svg, drawing: &BeamDrawing, frame: &Frame) {
     }
 }
 
-/// Draws one support at its position on the beam.
 fn draw_support(
     svg: &mut Svg,
     drawing: &BeamDrawing,
@@ -253,7 +241,7 @@ fn draw_support(
             svg.polygon(&[(across, top), feet[0], feet[1]], QUIET_INK);
         }
         BeamSupportKind::Clamped => {
-            // An end is clamped from its outer side, and a place between the ends from both sides.
+            // An end is clamped from its outer side, a place between the ends from both sides.
             let (left, right) = if position_mm <= 0.0 {
                 (across - SUPPORT_HALF_WIDTH, across)
             } else if position_mm >= drawing.length_mm {
@@ -279,7 +267,6 @@ fn draw_support(
     }
 }
 
-/// Draws a zigzag that stands on the ground and carries the point.
 fn draw_spring(svg: &mut Svg, (across, top): Point) {
     const TURNS: usize = 6;
     let foot = SPRING_GROUND_Y;
@@ -296,7 +283,6 @@ fn draw_spring(svg: &mut Svg, (across, top): Point) {
     svg.line(&[(across - SUPPORT_HALF_WIDTH, foot), (across + SUPPORT_HALF_WIDTH, foot)], 2.0, QUIET_INK);
 }
 
-/// Draws the deflected shape and its largest deflection.
 fn draw_deflection(svg: &mut Svg, drawing: &BeamDrawing, frame: &Frame) {
     let colour = palette(0);
     svg.line(&frame.shape, 2.5, colour);
@@ -319,7 +305,6 @@ fn draw_load(svg: &mut Svg, drawing: &BeamDrawing, frame: &Frame) {
     svg.text(&frame.centred(&drawing.load_label, (across, LOAD_LABEL_Y), FONT_SIZE + 1.0, colour));
 }
 
-/// Draws the beam's length between two ticks.
 fn draw_dimension(svg: &mut Svg, drawing: &BeamDrawing, frame: &Frame, y: f64) {
     let middle = frame.width / 2.0;
     let text = format!("{} mm", plain(drawing.length_mm));
@@ -341,7 +326,6 @@ fn draw_remark(svg: &mut Svg, frame: &Frame, y: f64) {
     svg.text(&frame.centred(&remark, (frame.width / 2.0, y), FONT_SIZE - 1.0, QUIET_INK));
 }
 
-/// Draws a vertical line between two points, with a head at each end if it is long enough for them.
 fn double_arrow(svg: &mut Svg, start: Point, end: Point, colour: Colour) {
     svg.line(&[start, end], 1.0, colour);
     let downward = (end.1 - start.1).signum();
@@ -351,14 +335,13 @@ fn double_arrow(svg: &mut Svg, start: Point, end: Point, colour: Colour) {
     }
 }
 
-/// Draws a filled triangle with its tip at the point, pointing along the unit vector.
+/// Draws a filled triangle with its tip at `tip`, along the unit vector `along`.
 fn arrow_head(svg: &mut Svg, tip: Point, along: Point, length: f64, colour: Colour) {
     let back = (tip.0 - along.0 * length, tip.1 - along.1 * length);
     let aside = (-along.1 * length * 0.4, along.0 * length * 0.4);
     svg.polygon(&[tip, (back.0 + aside.0, back.1 + aside.1), (back.0 - aside.0, back.1 - aside.1)], colour);
 }
 
-/// A number with three significant digits.
 fn rounded(value: f64) -> String {
     let unit = 10_f64.powf(value.abs().log10().floor() - 2.0);
     plain((value / unit).round() * unit)

@@ -10,7 +10,8 @@ use super::{Axis, Chart, Mark, Marker, Series};
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::SurfaceSpec;
 
-/// `what` ("The bench") with these sensors and its surface bent by `force_n` newtons; `None` if it cannot be drawn.
+/// Draws the surface bent by `force_n`, with its sensors; `None` if it cannot be drawn. `what` is
+/// its name.
 pub(super) fn bench_figure(
     what: &str,
     surface: &SurfaceSpec,
@@ -35,7 +36,7 @@ pub(super) fn bench_figure(
     Some(Figure::beam(format!("{what}: beam, supports, sensors and load"), &drawing, caption))
 }
 
-/// Chart of the sensors of some layouts: a named row for each, the first uppermost; a marker for each kind of sensor.
+/// Chart of sensor positions: a row per layout, the first uppermost; a marker per kind of sensor.
 pub(super) fn sites_chart(layouts: &[(String, &Layout)], length_m: f64, marks: Vec<Mark>) -> Chart {
     let kinds = SensorKind::ALL.into_iter().enumerate().filter_map(|(colour, kind)| {
         let of_row = |(row, (_, layout)): (usize, &(String, &Layout))| -> Vec<(f64, f64)> {
@@ -52,14 +53,13 @@ pub(super) fn sites_chart(layouts: &[(String, &Layout)], length_m: f64, marks: V
         .with_marks(marks)
 }
 
-/// An axis of named rows, the first uppermost.
+/// Axis of named rows, the first uppermost.
 pub(super) fn row_axis(names: &[&str]) -> Axis {
     let rows = names.len();
     let named = names.iter().enumerate().map(|(row, name)| (row_height(rows, row), (*name).to_owned()));
     Axis::default().from_to(0.4, rows as f64 + 0.6).named(named.collect())
 }
 
-/// Height of a row on an axis of [`row_axis`].
 pub(super) fn row_height(rows: usize, row: usize) -> f64 {
     (rows - row) as f64
 }

@@ -1,4 +1,4 @@
-//! The report of a comparison: every estimator's errors beside each other, and the limit.
+//! Report of a comparison: the errors of all estimators, and the limit.
 
 use maud::{Markup, html};
 
@@ -12,23 +12,23 @@ use palpate_estimators::evaluation::{ErrorSummary, Evaluation, limit_ratio, perc
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::surface::Extent;
 
-/// Number of stretches of the surface for which errors are averaged.
+/// Number of stretches over which errors are averaged.
 const STRETCHES: usize = 40;
-/// Greatest number of maps beside each other; further estimators are only in the table.
+/// Greatest number of maps; further estimators are in the table only.
 const MOST_MAPS: usize = 9;
 
 /// Contents of a comparison's report.
 #[derive(Clone, Copy)]
 pub struct ComparisonReport<'a> {
-    /// The page's title.
+    /// Page title.
     pub title: &'a str,
-    /// The surface and its sensors.
+    /// Surface and sensors.
     pub setup: &'a Setup,
-    /// Trials by which the estimators are compared, in words.
+    /// Description of the trials.
     pub trials: &'a str,
-    /// The estimators, best first.
+    /// Estimators, best first.
     pub comparisons: &'a [Comparison],
-    /// Kinds that do not suit the rig or the recording, with the reasons.
+    /// Unsuitable kinds of estimators, with the reasons.
     pub left_out: &'a [(&'static str, String)],
     /// Largest error in metres that counts for the effective length.
     pub tolerance_m: f64,
@@ -36,7 +36,7 @@ pub struct ComparisonReport<'a> {
     pub seed: u64,
 }
 
-/// Reports a comparison: `report.html`, one self-contained page, and its figures as SVG files.
+/// Returns `report.html` and its figures as SVG files.
 pub fn comparison_report(report: &ComparisonReport) -> Vec<ReportFile> {
     let (heading, errors) = match report.extent() {
         Extent::Line { .. } => ("Errors along the surface", report.along_figure()),
@@ -75,7 +75,7 @@ impl ComparisonReport<'_> {
         }
     }
 
-    /// The estimators that have an evaluation, with its summary.
+    /// Estimators with an evaluation, and their summaries.
     fn tried(&self) -> impl Iterator<Item = (&Comparison, &Evaluation, ErrorSummary)> {
         self.comparisons.iter().filter_map(|comparison| {
             let evaluation = &comparison.tried.evaluation;
@@ -145,9 +145,8 @@ impl ComparisonReport<'_> {
         }
     }
 
-    /// One line for each estimator.
     fn series(&self, points: impl Fn(&Evaluation) -> Vec<(f64, f64)>) -> Vec<Series> {
-        // The last colour is black, which is that of the limit.
+        // The seventh colour, black, is that of the limit.
         const COLOURS: usize = 6;
         let series = |(i, comparison): (usize, &Comparison)| {
             let (label, points) = (comparison.estimator.name(), points(&comparison.tried.evaluation));

@@ -1,4 +1,4 @@
-//! The report of dead areas: errors between sensors, by estimator and by number of sensors.
+//! Report of dead areas: errors between sensors, by estimator and number of sensors.
 
 use maud::{Markup, html};
 
@@ -8,7 +8,7 @@ use super::page::{Columns, Figure, Page, ReportFile, Section, Table};
 use super::{Axis, Chart, Series};
 use palpate_studies::dead_areas::{DeadAreaResults, DeadAreaRow, DeadAreas};
 
-/// Reports the dead areas: `report.html`, one self-contained page, and its figures as SVG files.
+/// Returns `report.html` and its figures as SVG files.
 pub fn dead_areas_report(study: &DeadAreas, findings: &DeadAreaResults) -> Vec<ReportFile> {
     let report = DeadAreasReport { study, findings };
     let folded = study.counts.iter().map(|count| report.folded_figure(*count));
@@ -31,7 +31,7 @@ struct DeadAreasReport<'a> {
 }
 
 impl DeadAreasReport<'_> {
-    /// Each sensing with each of its estimators, in order of appearance.
+    /// Pairs of sensing and estimator, in order of appearance.
     fn arms(&self) -> Vec<(&str, &'static str)> {
         let mut arms: Vec<(&str, &'static str)> = Vec::new();
         for row in &self.findings.rows {

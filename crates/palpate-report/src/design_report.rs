@@ -1,4 +1,4 @@
-//! The report of a sensor design: layouts by several methods, all judged in the same way.
+//! Report of a sensor design: layouts by several methods, with equal scores.
 
 use maud::{Markup, html};
 
@@ -19,30 +19,30 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::LimitCurve;
 use palpate_mechanics::surface::Extent;
 
-/// Approximate number of cells of a map, and the least and greatest number along each side.
+/// Approximate number of cells of a map, and the least and greatest number along a side.
 const CELLS: f64 = 1600.0;
 const CELLS_A_SIDE: std::ops::RangeInclusive<usize> = 5..=160;
 
 /// Contents of a sensor design's report.
 #[derive(Clone, Copy)]
 pub struct SensorDesignReport<'a> {
-    /// The page's title.
+    /// Page title.
     pub title: &'a str,
-    /// The surface, with the rig's own sensors.
+    /// Surface, with the rig's own sensors.
     pub setup: &'a Setup,
-    /// The problem that was solved.
+    /// Design problem.
     pub problem: &'a SensorProblem<'a>,
-    /// The layouts.
+    /// Designed layouts.
     pub designed: &'a [Designed],
     /// Errors of simulated calibrations, for some of the layouts.
     pub verified: &'a [(Method, Verification)],
-    /// Layouts of other numbers of sensors; empty if none were requested.
+    /// Layouts with other numbers of sensors; may be empty.
     pub counts: &'a [CountPoint],
-    /// The seed of searches and simulations.
+    /// Seed of searches and simulations.
     pub seed: u64,
 }
 
-/// Reports a design: `report.html`, one self-contained page, and its figures as SVG files.
+/// Returns `report.html` and its figures as SVG files.
 pub fn sensor_design_report(report: &SensorDesignReport) -> Vec<ReportFile> {
     let layouts = Section::new("layouts", "The layouts").table(report.table()).table(report.places());
     let limit = Section::new("limit", "The limit with the best of them");
@@ -66,7 +66,7 @@ pub fn sensor_design_report(report: &SensorDesignReport) -> Vec<ReportFile> {
 }
 
 impl<'a> SensorDesignReport<'a> {
-    /// The even layout, or the present one if its sensors are kept.
+    /// Even layout, or the present one if its sensors are kept.
     fn even(&self) -> Option<&'a Designed> {
         self.problem.reference(self.designed)
     }
@@ -167,7 +167,6 @@ impl<'a> SensorDesignReport<'a> {
             .caption(html! { "Where their sensors sit." })
     }
 
-    /// Figure of the sensors of every layout.
     fn sites_figure(&self) -> Figure {
         let row = |designed: &'a Designed| (designed.method.name().to_owned(), &designed.layout);
         let rows: Vec<_> = self.designed.iter().map(row).collect();
@@ -175,7 +174,7 @@ impl<'a> SensorDesignReport<'a> {
         Figure::chart(&chart, html! { "The sensors of every layout, a row each." })
     }
 
-    /// The limit along the surface for the even and the best layout, and the positions of their sensors.
+    /// Limit along the surface for the even and the best layout.
     fn limit_figure(&self) -> Option<Figure> {
         let (even, best) = (self.even(), self.best()?);
         let name = |designed: &Designed| format!("limit, {} layout", designed.method.name());
@@ -188,7 +187,7 @@ impl<'a> SensorDesignReport<'a> {
         let mut series: Vec<Series> = of_even.into_iter().chain(of_best).collect();
         let extremes = Extremes::from_lines(&series);
         let Extremes { least, greatest } = extremes;
-        // Sensors stand in two rows beneath the curves.
+        // Sensors are drawn in two rows beneath the curves.
         let (from, to, rows) = if extremes.are_far_apart() {
             (0.35 * least, 1.4 * greatest, [0.6 * least, 0.45 * least])
         } else {
@@ -214,7 +213,6 @@ impl<'a> SensorDesignReport<'a> {
         Some(Figure::chart(&chart, caption))
     }
 
-    /// The limit of a layout at the contacts of the design.
     fn limit_of(&self, designed: &Designed) -> Option<LimitCurve> {
         let setup = self.setup.clone().with_layout(designed.layout.clone()).ok()?;
         let positions = &self.problem.contacts().positions;
@@ -222,7 +220,6 @@ impl<'a> SensorDesignReport<'a> {
         LimitCurve::at_positions(&limit, self.problem.force_n(), self.problem.force(), positions).ok()
     }
 
-    /// The limit over a plane with the best and with the even layout.
     fn limit_maps(&self) -> Vec<Figure> {
         let cells = Cells::nearly_square(self.setup.surface().extent(), CELLS, CELLS_A_SIDE);
         let force = (self.problem.force_n(), self.problem.force());
@@ -253,7 +250,6 @@ impl<'a> SensorDesignReport<'a> {
         self.problem.design().keep_out.iter().map(mark).collect()
     }
 
-    /// The mean limit against the number of sensors.
     fn counts_figure(&self) -> Option<Figure> {
         let (first, last) = (self.counts.first()?, self.counts.last()?);
         let curve = |of: fn(&CountPoint) -> Option<Assessment>| -> Vec<(f64, f64)> {

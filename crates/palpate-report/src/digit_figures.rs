@@ -1,4 +1,4 @@
-//! Figures of a flexible digit: its shapes, the limit of the force, and the errors of the linear theory.
+//! Figures of a flexible digit: shapes, force limit, and errors of the linear theory.
 
 use maud::html;
 
@@ -13,18 +13,18 @@ use palpate_mechanics::limit::{CramerRaoBound, Force, LimitCurve};
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::{Digit, ForceDirection};
 
-/// Positions of the drawn contacts, as shares of the length.
+/// Drawn contacts, as shares of the length.
 const DRAWN_CONTACTS: [f64; 3] = [0.5, 0.75, 1.0];
-/// Positions where the linear theory is judged, as shares of the length: away from the tip, which an estimate cannot pass.
+/// Contacts for the linear theory, as shares of the length: away from the tip, which an estimate
+/// cannot pass.
 const JUDGED_CONTACTS: [f64; 3] = [0.45, 0.6, 0.8];
-/// Points of a drawn finger.
 const SHAPE_STEPS: u32 = 120;
 /// Number of forces of a curve, from a hundredth of the largest load to all of it.
 const FORCES: u32 = 60;
-/// Margin of a chart around the finger, as a share of its length.
+/// Margin around the finger, as a share of its length.
 const MARGIN: f64 = 0.06;
 
-/// `what` ("The bench"), the straight finger and its shape under `force_n` newtons at three places; x and y have the same scale.
+/// Draws the straight finger and its shape under `force_n` at three places, x and y to one scale.
 pub(super) fn shapes_figure(what: &str, digit: &Digit, layout: &Layout, force_n: f64) -> Figure {
     let l = digit.length_m();
     let points = |contact: Contact| {
@@ -42,7 +42,7 @@ pub(super) fn shapes_figure(what: &str, digit: &Digit, layout: &Layout, force_n:
     }
     let gauges = layout.sensors().iter().map(|sensor| (sensor.position.x_m * 1e3, 0.0)).collect();
     series.push(Series::markers("strain gauges", 6, gauges, Marker::Square));
-    // The plot is about as high as it is wide, and both axes span the finger and its margins.
+    // The plot is about as high as it is wide; both axes span the finger and its margins.
     let (low, high) = (-MARGIN * l * 1e3, (1.0 + MARGIN) * l * 1e3);
     let x = Axis::linear("along the straight finger, mm").from_to(low, high);
     let y = Axis::linear("across, mm").from_to(-high, -low);
@@ -58,7 +58,6 @@ pub(super) fn shapes_figure(what: &str, digit: &Digit, layout: &Layout, force_n:
     Figure::chart(&chart, caption)
 }
 
-/// The limit of the standard deviation of the force along the finger.
 pub(super) fn force_limit_figure(unknown: &LimitCurve) -> Figure {
     let points = in_milli(unknown.by_x(|bound| bound.sd_force_n.unwrap_or(f64::NAN)));
     let chart = Chart::new(
@@ -74,8 +73,8 @@ pub(super) fn force_limit_figure(unknown: &LimitCurve) -> Figure {
     Figure::chart(&chart, caption)
 }
 
-/// Errors of the linear theory on readings without noise: of position and of force by the force, each against the limit of
-/// the exact theory. Empty if no estimator suits the bench.
+/// Errors of the linear theory in position and force on readings without noise, relative to the
+/// exact limit. Empty if no estimator suits the bench.
 pub(super) fn linear_theory_figures(setup: &Setup, limit: &CramerRaoBound, digit: &Digit) -> Vec<Figure> {
     let Some(theory) = LinearTheory::new(setup, digit) else { return Vec::new() };
     let at_limit = |contact: Contact| {

@@ -1,4 +1,5 @@
-//! The report of Elliott's chain: its error by the number of components, beside the influence locator and the limit.
+//! Report of Elliott's chain: errors by number of components, against the influence locator and the
+//! limit.
 
 use maud::{Markup, html};
 
@@ -8,7 +9,7 @@ use super::{Axis, Chart, ErrorPoint, Marker, Series};
 use palpate_estimators::evaluation::Quantiles;
 use palpate_studies::elliott::{Chain, ChainRow, Elliott, ElliottResults, INNER};
 
-/// Reports the study: `report.html`, one self-contained page, and its figures as SVG files.
+/// Returns `report.html` and its figures as SVG files.
 pub fn elliott_report(study: &Elliott, findings: &ElliottResults) -> Vec<ReportFile> {
     let report = ElliottReport { study, findings };
     let sections = vec![
@@ -33,7 +34,7 @@ impl ElliottReport<'_> {
         self.findings.rows.iter().find(|row| row.chain == chain)
     }
 
-    /// The chains on components, with how many.
+    /// Chains on components, with the number of components.
     fn by_components(&self) -> impl Iterator<Item = (f64, &ChainRow)> {
         self.findings.rows.iter().filter_map(|row| match row.chain {
             Chain::Components(count) => Some((count as f64, row)),
@@ -117,7 +118,7 @@ impl ElliottReport<'_> {
         Series::error_bars(label, colour, points, Marker::Circle)
     }
 
-    /// The chains that do not depend on a number of components: a line across each.
+    /// Lines of the chains that do not depend on the number of components.
     fn across(&self, error: fn(&ChainRow) -> Option<Quantiles>) -> impl Iterator<Item = Series> {
         let chains = [
             (Chain::Readings, "network on all readings", 1),

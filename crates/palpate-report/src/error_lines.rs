@@ -1,4 +1,4 @@
-//! Errors along a surface as lines: medians with their bands, the tolerance, and the limit for comparison.
+//! Error lines along a surface: medians with bands, tolerance and limit.
 
 use super::numbers::mm;
 use super::{BandPoint, Chart, Mark, Series};
@@ -7,13 +7,13 @@ use palpate_estimators::setup::Setup;
 use palpate_mechanics::limit::{Bound, CramerRaoBound, Force, LimitCurve, LimitError};
 use palpate_mechanics::sensing::{Layout, NoiseError, Sensor, SensorKind};
 
-/// The founding paper's readings have no noise, and without noise there is no limit. Therefore the figures of its errors show the limit
-/// for the noise of a common displacement sensor, as in `examples/paper.toml`.
+/// Noise of a common displacement sensor, as in `examples/paper.toml`. The founding paper's
+/// readings have no noise, and without noise there is no limit.
 const ASSUMED_NOISE_M: f64 = 5e-6;
 /// Beginning of the line's name in a legend.
 const LABEL: &str = "limit";
 
-/// A line along the medians of some quantiles and, with `with_band`, a band from the 5th to the 95th percentile under it.
+/// Returns a line of medians; with `with_band`, also a band from the 5th to the 95th percentile.
 pub(super) fn banded(label: &str, colour: usize, along: &[(f64, Quantiles)], with_band: bool) -> Vec<Series> {
     let line = Series::line(label, colour, along.iter().map(|&(x, spread)| (x, spread.median)).collect());
     let band = along.iter().map(|&(x, spread)| BandPoint { x, low: spread.p05, high: spread.p95 });
@@ -21,18 +21,17 @@ pub(super) fn banded(label: &str, colour: usize, along: &[(f64, Quantiles)], wit
     band.into_iter().chain([line]).collect()
 }
 
-/// The tolerance as a mark among errors in mm.
 pub(super) fn tolerance_mark(tolerance_m: f64) -> Mark {
     Mark::HorizontalLine { y: tolerance_m * 1e3, label: format!("tolerance, {} mm", mm(tolerance_m)) }
 }
 
-/// The mean error of the best unbiased estimator along a bench's surface, in mm, dashed in black; `None` without a
-/// limit: for a surface without a model, sensors without noise, or an unknown force.
+/// Mean error of the best unbiased estimator along the surface, in mm, dashed in black. `None` for
+/// a surface without a model, sensors without noise, or an unknown force.
 pub(super) fn limit_line(setup: &Setup) -> Option<Series> {
     Some(line(&curve(setup, setup.layout()).ok()?, 6, format!("{LABEL}: what physics allows")))
 }
 
-/// The limit as of [`limit_line`]; for deflection sensors without noise, the limit for a noise that the legend states.
+/// [`limit_line`]; deflection sensors without noise get an assumed noise, which the legend states.
 pub(super) fn limit_line_or_assumed(setup: &Setup) -> Option<Series> {
     let clean = |sensor: &Sensor| sensor.kind == SensorKind::Deflection && sensor.channel.noise_sd == 0.0;
     match curve(setup, setup.layout()) {
@@ -46,15 +45,15 @@ pub(super) fn limit_line_or_assumed(setup: &Setup) -> Option<Series> {
     }
 }
 
-/// The mean error of the best unbiased estimator of an arm, in mm, dashed; `None` without a limit. The force is known or unknown,
-/// as for the locator; contacts have `force_n` newtons in both cases.
+/// Mean error of the best unbiased estimator of an arm, in mm, dashed; `None` without a limit. The
+/// knowledge of the force is that of the locator.
 pub(super) fn limit_line_of_arm(setup: &Setup, force_n: f64, colour: usize, label: &str) -> Option<Series> {
     let limit = setup.cramer_rao_bound().ok()?;
     let force = setup.force();
     Some(line(&LimitCurve::over_surface(&limit, force_n, force).ok()?, colour, label.to_owned()))
 }
 
-/// Remark on the line for the caption of a chart that has it; else empty.
+/// Remark for the caption of a chart with the limit; else empty.
 pub(super) fn limit_in_words(chart: &Chart) -> String {
     let Some(line) = chart.series.iter().find(|series| series.label.starts_with(LABEL)) else {
         return String::new();
@@ -81,7 +80,7 @@ fn line(curve: &LimitCurve, colour: usize, label: String) -> Series {
     Series::dashes(label, colour, in_milli(curve.by_x(Bound::mean_error_m)))
 }
 
-/// Points with both coordinates in thousandths of their unit: metres in mm, newtons in mN.
+/// Converts coordinates to thousandths: m to mm, N to mN.
 pub(super) fn in_milli(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     points.into_iter().map(|(x, y)| (x * 1e3, y * 1e3)).collect()
 }

@@ -1,4 +1,4 @@
-//! The report of one locator's errors.
+//! Report of a locator's errors.
 
 use maud::{Markup, html};
 
@@ -18,21 +18,21 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_rig::Rig;
 
-/// Greatest number of positions that are drawn as markers; more markers would cover each other, so a line is drawn.
+/// Greatest number of positions drawn as markers; more are drawn as a line.
 const MOST_MARKERS: usize = 80;
 
 /// Contents of an evaluation's report.
 #[derive(Clone, Copy, Debug)]
 pub struct EvaluationReport<'a> {
-    /// The page's title.
+    /// Page title.
     pub title: &'a str,
-    /// The locator, or the locators, that made the estimates.
+    /// Origin of the estimates.
     pub judged: Judged<'a>,
-    /// The estimates.
+    /// Estimates.
     pub evaluation: &'a Evaluation,
-    /// The recording with the located readings.
+    /// Origin of the located readings.
     pub recording: &'a Provenance,
-    /// Portions of the surface that are also judged by themselves.
+    /// Portions of the surface with errors of their own.
     pub portions: &'a [Portion],
     /// Largest error in metres that counts for the effective length.
     pub tolerance_m: f64,
@@ -41,20 +41,20 @@ pub struct EvaluationReport<'a> {
 /// Origin of the estimates.
 #[derive(Clone, Copy, Debug)]
 pub enum Judged<'a> {
-    /// Estimates of one locator.
+    /// One locator.
     Locator(&'a Locator),
-    /// Estimates of several locators of one rig, each fitted without the positions that it located.
+    /// Locators of one rig, each fitted without the positions that it located.
     CrossValidated {
-        /// The rig.
+        /// Rig.
         rig: &'a Rig,
         /// Number of locators.
         folds: usize,
-        /// The seed of the fits.
+        /// Seed of the fits.
         seed: u64,
     },
 }
 
-/// Reports an evaluation: `report.html`, one self-contained page, and its figures as SVG files.
+/// Returns `report.html` and its figures as SVG files.
 pub fn evaluation_report(report: &EvaluationReport) -> Vec<ReportFile> {
     let (heading, errors) = match report.extent() {
         Extent::Line { .. } => ("Errors along the surface", report.error_figure()),
@@ -211,8 +211,8 @@ impl EvaluationReport<'_> {
         Axis::linear(label).from_to(0.0, self.evaluation.extent.length_m() * 1e3)
     }
 
-    /// The estimated against the true position, with one marker for each reading; for many readings the median at each position and
-    /// its band.
+    /// Estimated against true position: a marker per reading, or for many readings medians with a
+    /// band.
     fn estimates(
         &self,
         label: &str,

@@ -1,4 +1,4 @@
-//! Reports: self-contained HTML pages with their figures as SVG, handed back as [`ReportFile`]s.
+//! Reports: self-contained HTML pages with figures as SVG, returned as [`ReportFile`]s.
 //!
 //! ```
 //! use palpate_estimators::arrangement::Training;
@@ -29,8 +29,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The reports are built from charts and maps, which are independent of their subject: a [`Chart`] is plain data from the caller.
-//! No function reads a file, the clock or the fonts of the machine, so the same data give the same bytes everywhere.
+//! Charts and maps are independent of their subject: a [`Chart`] is plain data from the caller. No
+//! function reads a file, the clock or the machine's fonts, so equal data give equal bytes
+//! everywhere.
 //!
 //! ```
 //! use palpate_report::{Axis, Chart, Series, chart_to_svg};
@@ -42,7 +43,8 @@
 //! assert!(svg.starts_with("<svg") && svg.contains("10 training positions"));
 //! ```
 //!
-//! The feature `png` adds copies of figures as PNG, drawn with a font of their own: `svg_to_png`, `with_png_copies`.
+//! The feature `png` adds PNG copies of figures with a built-in font: `svg_to_png`,
+//! `with_png_copies`.
 #![forbid(unsafe_code)]
 #![cfg_attr(
     not(test),

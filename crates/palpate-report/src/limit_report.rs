@@ -1,4 +1,4 @@
-//! The report of a bench's limit: the least possible error, position by position.
+//! Report of a bench's limit: the least possible error by position.
 
 use maud::{Markup, html};
 
@@ -20,34 +20,34 @@ use palpate_mechanics::surface::{Extent, SurfaceSpec};
 
 /// Limits beyond this many lengths of the surface are cut off: an error cannot exceed the surface.
 const MOST_LENGTHS: f64 = 10.0;
-/// Approximate number of cells of a map, and the least and greatest number along each side.
+/// Approximate number of cells of a map, and the least and greatest number along a side.
 const CELLS: f64 = 2000.0;
 const CELLS_A_SIDE: std::ops::RangeInclusive<usize> = 5..=200;
 
 /// Contents of a limit's report.
 #[derive(Clone, Copy)]
 pub struct LimitReport<'a> {
-    /// The page's title.
+    /// Page title.
     pub title: &'a str,
-    /// The surface and its sensors.
+    /// Surface and sensors.
     pub setup: &'a Setup,
     /// Limit.
     pub limit: &'a CramerRaoBound<'a>,
-    /// The limit all over the surface for a known force.
+    /// Limit over the surface for a known force.
     pub known: &'a LimitCurve,
-    /// The limit all over the surface for an unknown force.
+    /// Limit over the surface for an unknown force.
     pub unknown: &'a LimitCurve,
-    /// Whether the force is known on this bench; the warnings are about this case.
+    /// Knowledge of the force on this bench, which the warnings assume.
     pub force: Force,
     /// Warnings of the limit.
     pub warnings: &'a [LimitWarning],
     /// Positions for the table.
     pub listed: &'a [Position],
-    /// The smallest detectable force.
+    /// Smallest detectable force.
     pub touch: &'a LightestTouch<'a>,
 }
 
-/// Reports a limit: `report.html`, one self-contained page, and its figures as SVG files.
+/// Returns `report.html` and its figures as SVG files.
 ///
 /// ```
 /// use palpate_estimators::{influence::Influence, setup::Setup};
@@ -98,7 +98,6 @@ pub fn limit_report(report: &LimitReport) -> Vec<ReportFile> {
 }
 
 impl LimitReport<'_> {
-    /// The curve that is valid for this bench.
     fn curve(&self) -> &LimitCurve {
         match self.force {
             Force::Known => self.known,
@@ -168,7 +167,8 @@ impl LimitReport<'_> {
         Figure::chart(&chart, caption)
     }
 
-    /// The zones of the warnings; and for limits `beyond` the length of the surface a line at that length, which means "anywhere".
+    /// Zones of the warnings, and with `beyond` a line at the length of the surface, which means
+    /// "anywhere".
     fn marks(&self, beyond: bool) -> Vec<Mark> {
         let length_m = self.known.extent.length_m();
         let label = format!("length of the surface, {} mm", mm(length_m));
@@ -188,7 +188,6 @@ impl LimitReport<'_> {
         length.into_iter().chain(zones).collect()
     }
 
-    /// The limit over a plane, as two maps.
     fn limit_map(&self) -> Figure {
         let extent = self.known.extent;
         let cells = Cells::nearly_square(extent, CELLS, CELLS_A_SIDE);
@@ -221,7 +220,7 @@ impl LimitReport<'_> {
         Figure::map(&map, caption)
     }
 
-    /// Figures for a digit only: the limit of the force, and the range of the linear theory.
+    /// Figures for a digit: force limit, and range of the linear theory.
     fn digit_figures(&self) -> Vec<Figure> {
         let SurfaceSpec::Digit(digit) = self.setup.surface() else { return Vec::new() };
         let force_limit = force_limit_figure(self.unknown);
@@ -247,7 +246,7 @@ impl LimitReport<'_> {
             .caption(caption)
     }
 
-    /// Summary over the surface of the touch that is missed only rarely.
+    /// Summary for the higher detection probability.
     fn surely(&self) -> Option<TouchSummary> {
         let positions: Vec<Position> = self.known.points.iter().map(|point| point.position).collect();
         let [_, surely] = self.touch.summaries(&positions);
@@ -269,7 +268,6 @@ impl LimitReport<'_> {
         }
     }
 
-    /// The lightest touch along a line.
     fn touch_figure(&self) -> Option<Figure> {
         let length_mm = self.known.extent.length_m() * 1e3;
         let Extent::Line { .. } = self.known.extent else { return None };
@@ -339,7 +337,7 @@ fn limit_axis(extremes: Extremes, length_mm: f64) -> Axis {
     }
 }
 
-/// A text as a sentence: with a capital at its beginning and a full stop at its end.
+/// Adds a capital at the beginning and a full stop at the end.
 fn sentence(words: &str) -> String {
     let mut characters = words.chars();
     let first = characters.next().map(|first| first.to_uppercase().to_string()).unwrap_or_default();

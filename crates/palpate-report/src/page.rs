@@ -1,4 +1,4 @@
-//! Self-contained HTML pages: a page includes all its content, so a browser loads nothing else.
+//! Self-contained HTML pages, which load no other file.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -9,7 +9,7 @@ use super::{Chart, HeatMap, chart_to_svg, heat_map_to_svg};
 
 const STYLE: &str = include_str!("page.css");
 
-/// A file of a report, for the caller to write.
+/// A file of a report.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReportFile {
     /// Name in the report's folder: "report.html", "figure-2.svg".
@@ -18,7 +18,7 @@ pub struct ReportFile {
     pub bytes: Vec<u8>,
 }
 
-/// A page; figures and tables are numbered in their order.
+/// A page with numbered figures and tables.
 pub(crate) struct Page {
     title: String,
     lead: Markup,
@@ -27,7 +27,7 @@ pub(crate) struct Page {
     source: Markup,
 }
 
-/// A part of a page with a heading and an address for links.
+/// A part of a page with a heading and an anchor.
 pub(crate) struct Section {
     id: &'static str,
     heading: &'static str,
@@ -49,7 +49,6 @@ impl Section {
         self.block(Block::Text(text))
     }
 
-    /// Adds a figure, if there is one.
     pub fn figure(self, figure: impl Into<Option<Figure>>) -> Self {
         match figure.into() {
             Some(figure) => self.block(Block::Figure(figure)),
@@ -72,12 +71,11 @@ impl Section {
     }
 }
 
-/// A figure with its caption.
 pub(crate) struct Figure {
-    /// Alternative text: the content in a few words, for readers who cannot see the figure.
+    /// Alternative text for readers who cannot see the figure.
     alternative: String,
     svg: String,
-    /// The drawing for a screen as narrow as a phone's.
+    /// Drawing for a phone's screen.
     narrow_svg: String,
     caption: Markup,
 }
@@ -108,7 +106,7 @@ impl Figure {
         Self::new(alternative, [drawing, &narrow].map(BeamDrawing::svg), caption)
     }
 
-    /// The figure as HTML, with both drawings. They contain no ids, so ids of several drawings cannot collide.
+    /// Returns HTML with both drawings. They contain no ids, which could collide.
     fn markup(&self, number: usize) -> Markup {
         let [wide, narrow] =
             [("wide-drawing", &self.svg), ("narrow", &self.narrow_svg)].map(|(class, svg)| {
@@ -129,12 +127,12 @@ impl Figure {
 pub(crate) struct Table {
     caption: Markup,
     columns: Vec<Column>,
-    /// Cells by row, as many as there are columns. The first cell of a row is its heading.
+    /// Cells by row; the first cell of a row is its heading.
     rows: Vec<Vec<Markup>>,
 }
 
 impl Table {
-    /// A table with a row for each item; the first column heads the rows.
+    /// Returns a table with a row per item; the first column heads the rows.
     pub fn from_rows<R>(rows: impl IntoIterator<Item = R>) -> Columns<R> {
         let rows: Vec<R> = rows.into_iter().collect();
         Columns { cells: rows.iter().map(|_| Vec::new()).collect(), columns: Vec::new(), rows }
@@ -163,13 +161,12 @@ impl Table {
     }
 }
 
-/// A column's heading and the CSS class of its cells.
 pub(crate) struct Column {
     heading: String,
     class: &'static str,
 }
 
-/// A table that is built column by column, with a cell for every row.
+/// A table that is built by columns, with a cell for every row.
 pub(crate) struct Columns<R> {
     rows: Vec<R>,
     columns: Vec<Column>,
@@ -177,37 +174,37 @@ pub(crate) struct Columns<R> {
 }
 
 impl<R> Columns<R> {
-    /// A column of words.
+    /// Column of words.
     pub fn words<T: AsRef<str>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.column("text", heading, |row| text(cell(row)))
     }
 
-    /// A column of words without line breaks.
+    /// Column of words without line breaks.
     pub fn short<T: AsRef<str>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.column("short", heading, |row| text(cell(row)))
     }
 
-    /// A wide column of sentences.
+    /// Wide column of sentences.
     pub fn wide<T: AsRef<str>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.column("wide", heading, |row| text(cell(row)))
     }
 
-    /// A column of numbers given as text.
+    /// Column of numbers given as text.
     pub fn numeric<T: AsRef<str>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.column("number", heading, |row| text(cell(row)))
     }
 
-    /// A column of numbers with about three digits; a dash for a missing one.
+    /// Column of numbers with about three digits; a dash for a missing one.
     pub fn number<T: Into<Option<f64>>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.column("number", heading, |row| text(number(cell(row).into().unwrap_or(f64::NAN))))
     }
 
-    /// A column of lengths in metres, shown in millimetres; a dash for a missing one.
+    /// Column of lengths in metres, shown in millimetres; a dash for a missing one.
     pub fn mm<T: Into<Option<f64>>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.number(heading, |row| cell(row).into().map(|length_m| length_m * 1e3))
     }
 
-    /// A column of cells with this CSS class.
+    /// Column of cells with a CSS class.
     pub fn column(
         mut self,
         class: &'static str,
@@ -219,18 +216,16 @@ impl<R> Columns<R> {
         self
     }
 
-    /// Completes the table with its caption.
     pub fn caption(self, caption: Markup) -> Table {
         Table { caption, columns: self.columns, rows: self.cells }
     }
 }
 
-/// A text as markup.
 pub(crate) fn text(text: impl AsRef<str>) -> Markup {
     html! { (text.as_ref()) }
 }
 
-/// A good or bad verdict in words.
+/// Good or bad verdict in words.
 pub(crate) fn verdict(good: bool, yes: &str, no: &str) -> Markup {
     if good {
         html! { span.yes { "✓ " (yes) } }
@@ -239,7 +234,7 @@ pub(crate) fn verdict(good: bool, yes: &str, no: &str) -> Markup {
     }
 }
 
-/// Style of drawings on a dark page: each of their colours is replaced.
+/// Style that replaces the colours of drawings on a dark page.
 fn dark_drawings() -> String {
     let rule = |(light, dark): &(Colour, Colour)| {
         format!(
@@ -251,22 +246,20 @@ fn dark_drawings() -> String {
 }
 
 impl Page {
-    /// A page with its title, the items of its summary, and its sections.
     pub fn new(title: impl Into<String>, summary: Markup, sections: Vec<Section>) -> Self {
         Self { title: title.into(), lead: Markup::default(), summary, sections, source: Markup::default() }
     }
 
-    /// Adds an introduction between the title and the summary.
     pub fn with_lead(self, lead: Markup) -> Self {
         Self { lead, ..self }
     }
 
-    /// Adds the source of the page, which follows "Made by palpate 1.2.3".
+    /// Adds the source of the page, after "Made by palpate 1.2.3".
     pub fn with_source(self, source: Markup) -> Self {
         Self { source, ..self }
     }
 
-    /// The page and its figures as files.
+    /// Returns the page and its figures.
     pub fn files(self) -> Vec<ReportFile> {
         let (mut figures, mut tables) = (0, 0);
         let mut drawings = Vec::new();

@@ -1,13 +1,13 @@
-//! SVG to PNG with a built-in font, so that a figure is the same on every machine.
+//! SVG to PNG with a built-in font, equal on every machine.
 
 use super::ReportFile;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{self, fontdb};
 use std::sync::{Arc, LazyLock};
 
-/// Name of the font that replaces every generic family.
+/// Font that replaces every generic family.
 const FONT_FAMILY: &str = "Noto Sans";
-/// Pixels of a figure's PNG copy for each pixel of its SVG.
+/// Pixels of a PNG copy for each pixel of its SVG.
 const COPY_SCALE: f32 = 2.0;
 /// Longest side of a PNG in pixels.
 const MAX_SIDE_PX: u32 = 16_384;
@@ -18,13 +18,13 @@ pub enum PngError {
     /// The text is not an SVG document.
     #[error("not an SVG document: {0}")]
     Svg(#[from] usvg::Error),
-    /// The scale gives less than one pixel, or a side longer than the greatest one.
+    /// The scale gives less than one pixel, or too long a side.
     #[error(
         "scale {scale} gives {width_px} × {height_px} pixels; each side needs 1 to {max}",
         max = MAX_SIDE_PX
     )]
     Size {
-        /// The requested scale.
+        /// Requested scale.
         scale: f32,
         /// Resulting width.
         width_px: f32,
@@ -36,7 +36,7 @@ pub enum PngError {
     Encoding(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
 
-/// The files of a report, each figure followed by its PNG copy.
+/// Returns the files of a report, each figure followed by its PNG copy.
 ///
 /// # Errors
 /// As for [`svg_to_png`].
@@ -53,9 +53,7 @@ pub fn with_png_copies(files: Vec<ReportFile>) -> Result<Vec<ReportFile>, PngErr
     Ok(all)
 }
 
-/// PNG bytes of an SVG document drawn `scale` times its own size, each side rounded to whole pixels.
-///
-/// Every text is set in the built-in font, also if it names another font family.
+/// Draws an SVG document as PNG at `scale` times its size, in the built-in font.
 ///
 /// ```
 /// use palpate_report::{Chart, chart_to_svg, svg_to_png};
@@ -66,7 +64,8 @@ pub fn with_png_copies(files: Vec<ReportFile>) -> Result<Vec<ReportFile>, PngErr
 /// ```
 ///
 /// # Errors
-/// [`PngError`] for text that is not SVG, and for a scale that gives no pixels or a side longer than 16,384.
+/// [`PngError`] for text that is not SVG, and for a scale that gives no pixels or a side longer
+/// than 16,384.
 pub fn svg_to_png(svg: &str, scale: f32) -> Result<Vec<u8>, PngError> {
     let tree = parse(svg)?;
     let (width_px, height_px) =
@@ -81,7 +80,7 @@ pub fn svg_to_png(svg: &str, scale: f32) -> Result<Vec<u8>, PngError> {
     pixels.encode_png().map_err(|error| PngError::Encoding(Box::new(error)))
 }
 
-/// The SVG document with its texts set in the built-in font.
+/// Parses a document, with all texts in the built-in font.
 pub(crate) fn parse(svg: &str) -> Result<usvg::Tree, usvg::Error> {
     let options = usvg::Options {
         font_family: FONT_FAMILY.to_owned(),

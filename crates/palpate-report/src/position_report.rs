@@ -1,4 +1,4 @@
-//! The report of a design of training positions: arrangements by several rules and searches, all judged in the same way.
+//! Report of a design of training positions by several rules and searches.
 
 use maud::{Markup, html};
 
@@ -16,19 +16,19 @@ use palpate_mechanics::surface::Extent;
 /// Contents of a report of training positions.
 #[derive(Clone, Copy)]
 pub struct PositionDesignReport<'a> {
-    /// The page's title.
+    /// Page title.
     pub title: &'a str,
-    /// The surface with its sensors.
+    /// Surface and sensors.
     pub setup: &'a Setup,
-    /// The estimator's kind.
+    /// Kind of the estimator.
     pub estimator: &'a str,
-    /// The problem that was solved.
+    /// Design problem.
     pub problem: &'a PositionProblem,
-    /// The arrangements.
+    /// Arrangements.
     pub placed: &'a [Placed],
 }
 
-/// Reports training positions: `report.html`, one self-contained page, and its figures as SVG files.
+/// Returns `report.html` and its figures as SVG files.
 pub fn position_design_report(report: &PositionDesignReport) -> Vec<ReportFile> {
     let positions = Section::new("positions", "The arrangements").table(report.table());
     let errors = Section::new("errors", "Where the locator is off");
@@ -54,7 +54,7 @@ impl<'a> PositionDesignReport<'a> {
         best_placed(self.placed)
     }
 
-    /// The even arrangement and the best, if that is another one.
+    /// Even and best arrangement, if they differ.
     fn compared(&self) -> Vec<&'a Placed> {
         let best = self.best().filter(|best| best.placement != Placement::Even);
         self.even().into_iter().chain(best).collect()
@@ -106,7 +106,7 @@ impl<'a> PositionDesignReport<'a> {
             .caption(html! { "Where to press." })
     }
 
-    /// Figure of the positions of every arrangement, a row each, the first uppermost.
+    /// Positions of every arrangement, a row each, the first uppermost.
     fn rows_figure(&self) -> Figure {
         let rows = self.placed.len();
         let series = self.placed.iter().enumerate().map(|(row, placed)| {
@@ -120,7 +120,7 @@ impl<'a> PositionDesignReport<'a> {
         Figure::chart(&chart, html! { "The training positions of every arrangement, a row each." })
     }
 
-    /// The mean error at each contact, of the even arrangement and the best.
+    /// Mean error at each contact, of the even and the best arrangement.
     fn errors_figure(&self) -> Figure {
         let contacts = &self.problem.contacts().positions;
         let points = |placed: &Placed| {
@@ -141,7 +141,7 @@ impl<'a> PositionDesignReport<'a> {
         Figure::chart(&chart, html! { "The mean error at each contact over all verifying calibrations." })
     }
 
-    /// Maps of the error over a plane with the even arrangement and with the best, side by side in one scale, with the positions.
+    /// Maps of the error with the even and the best arrangement, on one scale.
     fn maps(&self) -> Vec<Figure> {
         let contacts = &self.problem.contacts().positions;
         let columns = contacts.iter().take_while(|at| at.y_m == contacts[0].y_m).count().max(1);

@@ -1,4 +1,4 @@
-//! The report of one load profile: the distribution of the force, its resolution, and the residuals.
+//! Report of a load profile: force distribution, resolution and residuals.
 
 use maud::{Markup, html};
 
@@ -10,7 +10,7 @@ use palpate_estimators::estimator::{ForceBounds, LoadProfile, Patch, PatchLimit,
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::{Extent, UniformLoad};
 
-/// Places of the drawn averaging kernels, as shares of the length, and on a plane also of the width.
+/// Drawn averaging kernels, as shares of the length, and on a plane also of the width.
 const KERNEL_PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 const KERNEL_PLACES_ON_A_PLANE: [[f64; 2]; 3] = [[0.5, 0.5], [0.25, 0.25], [0.1, 0.5]];
 /// Factor from N/m to N/mm, and from Pa to kPa.
@@ -19,25 +19,25 @@ const PER_THOUSAND: f64 = 1e-3;
 /// Contents of a profile's report.
 #[derive(Clone, Copy)]
 pub struct ProfileReport<'a> {
-    /// The page's title.
+    /// Page title.
     pub title: &'a str,
-    /// The sensors.
+    /// Sensors.
     pub layout: &'a Layout,
-    /// The reading, in SI units.
+    /// Reading, in SI units.
     pub reading: &'a [f64],
-    /// The load estimated from the reading.
+    /// Estimated load.
     pub profile: &'a LoadProfile,
-    /// The limit of each patch; `None` if the readings do not determine all patches.
+    /// Limit of each patch; `None` if a patch is unidentifiable.
     pub limits: Option<&'a [PatchLimit]>,
     /// Resolution of the layout; `None` without load.
     pub resolution: Option<&'a Resolution>,
-    /// The simulated loads; empty if the truth is unknown.
+    /// Simulated loads; empty for an unknown truth.
     pub truth: &'a [UniformLoad],
     /// Origin of the reading: a file and a line, or a rig and a seed.
     pub source: &'a str,
 }
 
-/// Reports a load profile: `report.html`, one self-contained page, and its figures as SVG files.
+/// Returns `report.html` and its figures as SVG files.
 pub fn profile_report(report: &ProfileReport) -> Vec<ReportFile> {
     let (load, resolved) = match report.extent() {
         Extent::Line { .. } => (
@@ -94,7 +94,7 @@ impl<'a> ProfileReport<'a> {
         }
     }
 
-    /// The middle of each cell of a line in mm, with a figure of the cell.
+    /// Middle of each cell of a line in mm, with a figure of the cell.
     fn by_cell(&self, figure: impl Fn(usize) -> f64) -> Vec<(f64, f64)> {
         let centres = self.profile.cells.centres().enumerate();
         centres.map(|(cell, centre)| (centre.x_m * 1e3, figure(cell))).collect()
@@ -139,7 +139,7 @@ impl<'a> ProfileReport<'a> {
         Figure::chart(&chart, caption)
     }
 
-    /// The simulated loads in N/mm, as a step function.
+    /// Simulated loads in N/mm, as a step function.
     fn truth_steps(&self) -> Vec<(f64, f64)> {
         let mut loads = self.truth.to_vec();
         loads.sort_by(|a, b| a.from().x_m.total_cmp(&b.from().x_m));
@@ -236,7 +236,7 @@ impl<'a> ProfileReport<'a> {
         Figure::map(&self.map("Averaging kernels", "share", panels), caption)
     }
 
-    /// The residuals: along a line by place, on a plane by number.
+    /// Residuals: along a line by place, on a plane by number.
     fn residual_figure(&self) -> Figure {
         let mut kinds = self.layout.kinds();
         kinds.dedup();
@@ -326,12 +326,12 @@ impl<'a> ProfileReport<'a> {
     }
 }
 
-/// Both ends of an interval in millimetres, to a tenth.
+/// Interval in millimetres, to a tenth.
 fn interval_mm((from_m, to_m): (f64, f64)) -> String {
     format!("{}–{}", tenths_mm(from_m), tenths_mm(to_m))
 }
 
-/// The ends of an interval of a force, in newtons; the upper one may be infinite.
+/// Force interval in newtons; the upper end may be infinite.
 fn interval_n((low_n, high_n): (f64, f64)) -> String {
     if high_n.is_finite() {
         format!("{}–{}", number(low_n), number(high_n))
@@ -340,7 +340,6 @@ fn interval_n((low_n, high_n): (f64, f64)) -> String {
     }
 }
 
-/// A length in millimetres, to a tenth.
 fn tenths_mm(length_m: f64) -> String {
     format!("{:.1}", length_m * 1e3)
 }

@@ -1,5 +1,5 @@
-//! The report of any study: its arms side by side, their layouts, and their errors along the surface; and parts that the report
-//! of the founding paper shares.
+//! Report of any study: arms, layouts and errors along the surface; parts are shared with the
+//! paper's report.
 
 use maud::{Markup, html};
 
@@ -13,7 +13,7 @@ use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::Extent;
 use palpate_studies::{Arm, ArmOutcome, ArmResults, PreparedStudy, RunFacts, StudyResults};
 
-/// Greatest number of arms that a table alone distinguishes; more are also drawn side by side.
+/// Greatest number of arms that a table alone distinguishes.
 const FEW_ARMS: usize = 3;
 /// Greatest number of overlapping bands in a figure.
 const MOST_BANDS: usize = 2;
@@ -23,17 +23,17 @@ const BESIDE: f64 = 0.22;
 /// Contents of a study's report.
 #[derive(Clone, Copy, Debug)]
 pub struct StudyReport<'a> {
-    /// The study.
+    /// Study.
     pub study: &'a PreparedStudy,
-    /// Every fit, by arm; arms may be missing.
+    /// Fits by arm; arms may be missing.
     pub outcomes: &'a [ArmOutcome],
-    /// The figures of these outcomes.
+    /// Figures of these outcomes.
     pub results: &'a StudyResults,
     /// Facts of the run.
     pub run: &'a RunFacts,
 }
 
-/// Reports any study: `report.html`, one self-contained page, and its figures as SVG files.
+/// Returns `report.html` and its figures as SVG files.
 pub fn study_report(report: &StudyReport) -> Vec<ReportFile> {
     let layouts = layouts(report);
     let mut sections =
@@ -68,7 +68,6 @@ fn summary(report: &StudyReport) -> Markup {
     }
 }
 
-/// The arm with the smallest average error, in words.
 pub(super) fn least_error(report: &StudyReport) -> Option<Markup> {
     let median = |arm: &&ArmResults| arm.error_percent.median;
     let best = report.results.arms.iter().min_by(|a, b| median(a).total_cmp(&median(b)))?;
@@ -80,7 +79,6 @@ pub(super) fn least_error(report: &StudyReport) -> Option<Markup> {
     })
 }
 
-/// The arm with the largest effective length, in words.
 pub(super) fn longest(report: &StudyReport) -> Option<Markup> {
     let median = |arm: &&ArmResults| arm.effective_length_percent.median;
     let best = report.results.arms.iter().max_by(|a, b| median(a).total_cmp(&median(b)))?;
@@ -91,7 +89,7 @@ pub(super) fn longest(report: &StudyReport) -> Option<Markup> {
     })
 }
 
-/// The average errors of all arms, a row each, if there are more than a few.
+/// Average errors of all arms, a row each, if there are more than a few.
 fn overview(report: &StudyReport) -> Option<Figure> {
     let arms = &report.results.arms;
     if arms.len() <= FEW_ARMS {
@@ -126,15 +124,14 @@ fn overview(report: &StudyReport) -> Option<Figure> {
     Some(Figure::chart(&chart, caption))
 }
 
-/// A figure by which arms are compared.
 struct Compared {
     label: String,
     error: fn(&ArmResults) -> Option<Quantiles>,
     limit: fn(&ArmResults) -> Option<f64>,
 }
 
-/// The error over all positions and in the first portion; or, if the study distinguishes them, between training positions and
-/// beyond them.
+/// Errors over all positions and in the first portion, or between training positions and beyond
+/// them.
 fn compared(report: &StudyReport) -> Vec<Compared> {
     if report.study.judging().training_span {
         let span = |label: &str, error: fn(&ArmResults) -> Option<Quantiles>| Compared {
@@ -162,7 +159,7 @@ fn compared(report: &StudyReport) -> Vec<Compared> {
     all.into_iter().chain(first).collect()
 }
 
-/// The layouts of all arms, each once, with the arms that have it.
+/// Distinct layouts, with their arms.
 fn layouts<'a>(report: &StudyReport<'a>) -> Vec<(Vec<&'a str>, &'a Layout)> {
     let mut layouts: Vec<(Vec<&str>, &Layout)> = Vec::new();
     let places = |layout: &Layout| -> Vec<_> {
@@ -178,7 +175,6 @@ fn layouts<'a>(report: &StudyReport<'a>) -> Vec<(Vec<&'a str>, &'a Layout)> {
     layouts
 }
 
-/// Figure of the layouts' sensors along the surface.
 fn layouts_figure(report: &StudyReport, layouts: &[(Vec<&str>, &Layout)]) -> Figure {
     let row = |arms: &[&str]| match arms {
         [] => String::new(),
@@ -190,7 +186,6 @@ fn layouts_figure(report: &StudyReport, layouts: &[(Vec<&str>, &Layout)]) -> Fig
     Figure::chart(&sites_chart(&rows, report.length_m(), Vec::new()), caption)
 }
 
-/// Table of the layouts, each with its arms.
 fn layouts_table(layouts: &[(Vec<&str>, &Layout)], extent: Extent) -> Table {
     Table::from_rows(layouts)
         .wide("arms", |(arms, _)| arms.join(", "))
@@ -198,7 +193,7 @@ fn layouts_table(layouts: &[(Vec<&str>, &Layout)], extent: Extent) -> Table {
         .caption(html! { "Where the sensors of every arm sit." })
 }
 
-/// Errors along the surface: a figure for the arms that share a title, and one for each arm without a title.
+/// Errors along the surface, in a figure per shared title and per arm without a title.
 fn along_the_surface(report: &StudyReport) -> Vec<Figure> {
     let mut groups: Vec<(Option<&str>, Vec<&Arm>)> = Vec::new();
     let run = report.results.arms.iter().filter_map(|arm| report.arm(&arm.name));
@@ -266,7 +261,6 @@ fn limit_of(arm: &Arm, colour: usize, label: &str) -> Option<Series> {
     limit_line_of_arm(setup, setup.force_n().or(arm.rig.pressed_setup().ok()?.force_n())?, colour, label)
 }
 
-/// An arm among the lines of a figure.
 #[derive(Clone, Copy)]
 pub(crate) struct ArmLine<'a> {
     pub arm: &'a str,
@@ -275,23 +269,22 @@ pub(crate) struct ArmLine<'a> {
 }
 
 impl<'a> StudyReport<'a> {
-    /// The outcome of an arm that has at least one fit.
+    /// Outcome of an arm with at least one fit.
     pub(crate) fn outcome(&self, arm: &str) -> Option<&'a ArmOutcome> {
         self.outcomes.iter().find(|outcome| outcome.name == arm && !outcome.fits.is_empty())
     }
 
-    /// An arm of the study.
     pub(crate) fn arm(&self, name: &str) -> Option<&'a Arm> {
         self.study.study.arms.iter().find(|arm| arm.name == name)
     }
 
-    /// Noun for the fits, singular and plural: networks, or locators if some arm has another estimator.
+    /// Noun for the fits, singular and plural: networks, or locators if some arm has another
+    /// estimator.
     pub(crate) fn noun(&self) -> [&'static str; 2] {
         let trained = self.results.arms.iter().all(|arm| arm.epochs.is_some());
         if trained { ["network", "networks"] } else { ["locator", "locators"] }
     }
 
-    /// Number of fits of all arms.
     pub(crate) fn networks(&self) -> usize {
         self.results.arms.iter().map(|arm| arm.seeds).sum()
     }
@@ -307,23 +300,21 @@ impl<'a> StudyReport<'a> {
         }
     }
 
-    /// First and last of the judged positions, in metres.
+    /// First and last evaluated position, in metres.
     pub(crate) fn judged_portion(&self) -> Option<Portion> {
         let positions = &self.study.judging().positions;
         Some(Portion { from_m: positions.first()?.x_m, to_m: positions.last()?.x_m })
     }
 
-    /// The line along the surface of the first arm.
+    /// Extent of the first arm, if it is a line.
     fn extent(&self) -> Option<Extent> {
         Some(self.study.study.arms.first()?.rig.setup.surface().extent().along_x())
     }
 
-    /// Length in metres.
     pub(crate) fn length_m(&self) -> f64 {
         self.extent().map_or(f64::NAN, |extent| extent.length_m())
     }
 
-    /// A sentence about the networks that did not converge; `None` if all did.
     pub(crate) fn not_converged(&self) -> Option<String> {
         let trained = || self.results.arms.iter().filter(|arm| arm.converged.is_some());
         let left: usize = trained().map(|arm| arm.seeds - arm.converged.unwrap_or(arm.seeds)).sum();
@@ -338,7 +329,7 @@ impl<'a> StudyReport<'a> {
     }
 }
 
-/// Quantiles over an arm's seeds of a figure of each contact, by position in mm.
+/// Quantiles of a figure over an arm's seeds, by position in mm.
 pub(crate) fn spread_by_position(
     outcome: &ArmOutcome,
     figure: impl Fn(&Located) -> f64,
@@ -346,14 +337,15 @@ pub(crate) fn spread_by_position(
     outcome.by_position(figure).into_iter().map(|(x_m, spread)| (x_m * 1e3, spread)).collect()
 }
 
-/// The location error of an arm in mm along the surface, with a band over its seeds if there are several; empty without a fit.
+/// Location error of an arm in mm along the surface, with an optional band over several seeds;
+/// empty without a fit.
 pub(crate) fn errors(report: &StudyReport, line: &ArmLine, with_band: bool) -> Vec<Series> {
     let Some(outcome) = report.outcome(line.arm) else { return Vec::new() };
     let along = spread_by_position(outcome, |located| located.error_m() * 1e3);
     banded(line.label, line.colour, &along, with_band && outcome.fits.len() > 1)
 }
 
-/// Location error along the surface, in mm on a logarithmic axis, against the limit of the first arm; `None` if no arm has a fit.
+/// Chart of location errors in mm with the limit of the first arm; `None` without a fit.
 pub(crate) fn error_chart(report: &StudyReport, title: &str, arms: &[ArmLine]) -> Option<Chart> {
     let mut series: Vec<Series> = arms.iter().flat_map(|line| errors(report, line, true)).collect();
     if series.is_empty() {
@@ -363,7 +355,7 @@ pub(crate) fn error_chart(report: &StudyReport, title: &str, arms: &[ArmLine]) -
     Some(chart_of_errors(report, title, series))
 }
 
-/// A chart of location errors in mm along the surface, on a logarithmic axis, with the tolerance.
+/// Chart of location errors in mm, on a logarithmic axis, with the tolerance.
 pub(crate) fn chart_of_errors(report: &StudyReport, title: &str, series: Vec<Series>) -> Chart {
     let length_mm = report.length_m() * 1e3;
     let x = Axis::linear("load position, mm").from_to(0.0, length_mm);
@@ -374,7 +366,7 @@ pub(crate) fn chart_of_errors(report: &StudyReport, title: &str, series: Vec<Ser
 /// Low end of the axis of errors: errors cross zero, which a logarithmic axis cannot show.
 const LEAST_ERROR_MM: f64 = 0.05;
 
-/// Table of every arm with its figures, without empty columns.
+/// Table of every arm, without empty columns.
 pub(crate) fn arms_table(report: &StudyReport) -> Table {
     let arms = &report.results.arms;
     let mut table = Table::from_rows(arms.iter().enumerate()).short("arm", |(_, arm)| arm.name.clone());
@@ -390,7 +382,7 @@ pub(crate) fn arms_table(report: &StudyReport) -> Table {
     })
 }
 
-/// A column of the arms' table, with a cell for each arm; `None` for an empty one.
+/// A column with a cell for each arm; `None` for an empty one.
 struct ArmColumn {
     heading: String,
     cells: Vec<Option<Markup>>,
@@ -452,18 +444,16 @@ fn arm_columns(report: &StudyReport) -> Vec<ArmColumn> {
     columns
 }
 
-/// The median, and beneath it the range, if it differs.
+/// Median, and beneath it the range, if it differs.
 fn stacked(spread: Quantiles, shown: fn(f64) -> String) -> Markup {
     let [median, low, high] = [spread.median, spread.p05, spread.p95].map(shown);
     html! { (median) @if low != median || high != median { span.range { (low) "–" (high) } } }
 }
 
-/// A text without line breaks.
 fn unbroken(text: &str) -> String {
     text.replace(' ', "\u{a0}").replace('–', "\u{2060}–\u{2060}")
 }
 
-/// Table of the facts of the run.
 pub(crate) fn run_table(report: &StudyReport) -> Table {
     let run = report.run;
     let mut facts = vec![
@@ -497,7 +487,6 @@ fn counted_seeds(seeds: u64) -> String {
     }
 }
 
-/// The study and the seeds of a page.
 pub(crate) fn source(report: &StudyReport) -> Markup {
     let run = report.run;
     html! {
@@ -506,7 +495,6 @@ pub(crate) fn source(report: &StudyReport) -> Markup {
     }
 }
 
-/// Glossary of a study's terms.
 pub(crate) fn glossary(report: &StudyReport) -> Markup {
     let tolerance = mm(report.study.judging().tolerance_m);
     html! {

@@ -1,4 +1,4 @@
-//! The report of the track of a contact.
+//! Report of the track of a contact.
 
 use maud::{Markup, html};
 
@@ -15,32 +15,33 @@ use palpate_mechanics::surface::Extent;
 const MOST_POINTS: usize = 60;
 /// Greatest number of points of a line; more cannot be distinguished.
 const MOST_OF_LINE: usize = 2000;
-/// Approximate width of the plot area of a chart, and height of the parts above and below it: a plane is drawn to scale.
+/// Approximate width of the plot area, and height of the parts above and below it: a plane is drawn
+/// to scale.
 const PLOT_WIDTH_PX: f64 = 630.0;
 const AROUND_PLOT_PX: f64 = 130.0;
 
 /// Contents of a track's report.
 #[derive(Clone, Copy, Debug)]
 pub struct TrackReport<'a> {
-    /// The page's title.
+    /// Page title.
     pub title: &'a str,
-    /// The readings' source.
+    /// Source of the readings.
     pub source: &'a str,
-    /// The surface.
+    /// Extent of the surface.
     pub extent: Extent,
-    /// The tracks to show: of the filter or of the smoother.
+    /// Tracks of the filter or smoother.
     pub tracks: &'a [Track],
-    /// Name of the method of tracking: "filter" or "smoother".
+    /// Method of tracking: "filter" or "smoother".
     pub how: &'a str,
-    /// The true contacts of each track, if the source contains them; a contact that did not touch has force 0.
+    /// True contacts of each track, if known; force 0 for no contact.
     pub truths: &'a [Vec<Contact>],
-    /// Errors of the filter and of the smoother, by name; empty if the truth is unknown.
+    /// Errors of filter and smoother, by name; empty for an unknown truth.
     pub errors: &'a [(&'static str, TrackErrors)],
-    /// Errors by the contact's speed; may be empty.
+    /// Errors by contact speed; may be empty.
     pub sweep: &'a [SpeedErrors],
 }
 
-/// Reports a track: `report.html`, one self-contained page, and its figures as SVG files.
+/// Returns `report.html` and its figures as SVG files.
 pub fn track_report(report: &TrackReport) -> Vec<ReportFile> {
     let track = match report.extent {
         Extent::Line { .. } => report.track_figure(),
@@ -97,7 +98,6 @@ impl TrackReport<'_> {
         Figure::chart(&chart, caption)
     }
 
-    /// The path over a plane, drawn to scale.
     fn path_figure(&self) -> Figure {
         let path = |places: &mut dyn Iterator<Item = Option<Position>>| -> Vec<(f64, f64)> {
             places.map(|place| place.map_or((f64::NAN, f64::NAN), in_mm)).collect()
@@ -128,7 +128,7 @@ impl TrackReport<'_> {
         Series::markers(format!("single readings{every}"), 4, points, Marker::Cross)
     }
 
-    /// The track less the true position, with its 95 % band; if the truth is unknown, only the band about the track.
+    /// Track minus true position, with its 95 % band; only the band if the truth is unknown.
     fn errors_figure(&self) -> Figure {
         let stride = self.tracks.len().div_ceil(MOST_OF_LINE).max(1);
         let mut series = Vec::new();
@@ -160,7 +160,6 @@ impl TrackReport<'_> {
         Figure::chart(&chart, html! { (caption) })
     }
 
-    /// Coordinates with a line in the figure of errors: each contact, or both coordinates of a plane.
     fn coordinates(&self) -> Vec<Coordinate> {
         let named = |name, contact, across| Coordinate { name, contact, across };
         match self.extent {
@@ -171,7 +170,8 @@ impl TrackReport<'_> {
         }
     }
 
-    /// The track at reading `i` and both ends of its 95 % interval in mm, less the truth; less the track if the truth is unknown.
+    /// Track and 95 % interval at reading `i` in mm, minus the truth, or the track if the truth is
+    /// unknown.
     fn off_mm(&self, i: usize, coordinate: &Coordinate) -> Option<[f64; 3]> {
         let track = &self.tracks[i];
         let (tracked, truth) = match self.truths.get(i) {
@@ -191,7 +191,6 @@ impl TrackReport<'_> {
         Some([place_m, low_m, high_m].map(|end_m| (end_m - from_m) * 1e3))
     }
 
-    /// Greatest number of tracked contacts.
     fn most_contacts(&self) -> usize {
         self.tracks.iter().map(|track| track.contacts.len()).max().unwrap_or(0)
     }
@@ -244,9 +243,8 @@ impl TrackReport<'_> {
     }
 }
 
-/// Coordinate of a contact in the figure of errors.
 struct Coordinate {
-    /// Name, which follows "track".
+    /// Name after "track".
     name: &'static str,
     contact: usize,
     across: bool,

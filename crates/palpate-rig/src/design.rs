@@ -15,9 +15,8 @@ use crate::error::RigError;
 use crate::sensors::kind_on;
 use crate::values::{AtLeastZero, Count, Length, NotNegative, Number, Point, Positive, Written, check_order};
 
-/// Greatest number of candidate sites that a search goes through in reasonable time.
+/// Limit for a reasonable search time.
 const MOST_SITES: i64 = 1_000_000;
-/// Greatest number of contact positions to judge a layout by.
 const MOST_CONTACTS: f64 = 10_000.0;
 
 /// Candidates of a sensor design, and its constraints.
@@ -165,7 +164,7 @@ fn offers(listed: &At<Vec<At<OfferKeys>>>, setup: &Setup) -> Result<Vec<SensorOf
 }
 
 impl At<OfferKeys> {
-    /// A kind with its noise and cost; the faults that are not named here are those of the rig's own sensors of the kind.
+    /// Missing faults are those of the rig's sensors of the kind.
     fn build(&self, setup: &Setup) -> Result<SensorOffer, RigError> {
         let kind = kind_on(setup.surface(), &self.measure)?;
         let own = setup.layout().sensors().iter().find(|sensor| sensor.kind == kind);

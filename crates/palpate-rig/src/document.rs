@@ -1,14 +1,12 @@
-//! TOML read into types by serde, with the key, the place in the document and the written value in every error.
+//! Deserialization of TOML with key, place and written value in every error.
 //!
-//! A file's sections are plain types with `#[derive(Deserialize)]`. A value that a type refuses, in serde's words, becomes a
-//! [`RigError`]. The innermost value that the error comes from gives it its key and place. Two conventions go beyond serde's.
-//! A value of type [`At`] keeps its place, for checks that need other values too. And the name of an enum determines where its
-//! variant comes from:
+//! An [`At`] keeps the place of its value. The name of an enum determines the source of its variant:
 //!
-//! - `#[serde(rename = "by kind")]`: from the key `kind` of a table; the table's other keys are the variant's. `by kind or network`
-//!   adds a variant for tables that lack the key.
-//! - `#[serde(rename = "by shape")]`: from the shape of the value: `Text` or `Number`, or `Scalar` for both; `List`; `Table`.
-//! - Any other name: from a word.
+//! - `#[serde(rename = "by kind")]`: the key `kind` of a table; `by kind or network` adds a variant for
+//!   tables without it.
+//! - `#[serde(rename = "by shape")]`: the shape of the value: `Text` or `Number`, or `Scalar` for both;
+//!   `List`; `Table`.
+//! - Any other name: a word.
 
 use std::marker::PhantomData;
 use std::ops::Deref;
@@ -24,17 +22,17 @@ use toml::de::{DeString, DeTable, DeValue};
 
 use crate::error::{Place, RigError, RigProblem};
 
-/// A value and its place.
+/// Value and its place.
 #[derive(Clone, Debug)]
 pub(crate) struct At<T> {
     value: T,
     pub place: Place,
 }
 
-/// Parses the text of a document.
+/// Parses TOML.
 ///
 /// # Errors
-/// [`RigError`] when it is not TOML.
+/// [`RigError`] for invalid TOML.
 pub(crate) fn parse(text: &str) -> Result<Spanned<DeValue<'_>>, RigError> {
     match DeTable::parse(text) {
         Ok(table) => Ok(Spanned::new(table.span(), DeValue::Table(table.into_inner()))),
@@ -42,7 +40,7 @@ pub(crate) fn parse(text: &str) -> Result<Spanned<DeValue<'_>>, RigError> {
     }
 }
 
-/// Reads a value of a document; `path` is its path there, empty for the whole document.
+/// Reads a value; `path` is empty for the whole document.
 ///
 /// # Errors
 /// [`RigError`] for the first problem.
@@ -58,12 +56,10 @@ impl<T> Deref for At<T> {
     }
 }
 
-/// The place of a key; `None` for a missing key.
 pub(crate) fn place<T>(key: &Option<At<T>>) -> Option<&Place> {
     key.as_ref().map(|key| &key.place)
 }
 
-/// The name by which [`At`] requests a value's place.
 const AT: &str = "At";
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for At<T> {
@@ -77,7 +73,6 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for At<T> {
     }
 }
 
-/// The parts of an [`At`], one by one.
 struct Parts<'a> {
     node: Node<'a>,
     given: usize,
@@ -100,12 +95,11 @@ impl<'de> SeqAccess<'de> for Parts<'_> {
     }
 }
 
-/// A value of the document that is being read.
 #[derive(Clone)]
 struct Node<'a> {
     value: &'a DeValue<'a>,
     place: Place,
-    /// The key of a table that determined its variant, and the value of that key.
+    /// Key and value that determined the variant.
     tag: Option<(&'static str, &'a str)>,
 }
 
@@ -126,19 +120,17 @@ impl<'a> Node<'a> {
         Self { value, place: Place { path: path.to_owned(), span, written }, tag: None }
     }
 
-    /// Reads this value; an error of its type gets the value's place.
     fn read<'de, S: DeserializeSeed<'de>>(self, seed: S) -> Result<S::Value, RigError> {
         let place = self.place.clone();
         seed.deserialize(self).map_err(|error| error.with_place(&place))
     }
 
-    /// The value of one of this table's keys.
     fn child(&self, key: &str, value: &'a Spanned<DeValue<'a>>) -> Self {
         let dot = if self.place.path.is_empty() { "" } else { "." };
         Self::new(&format!("{}{dot}{key}", self.place.path), value)
     }
 
-    /// This table's entries in the order of the document, without the key that determined its variant.
+    /// Entries in the order of the document, without the key of the variant.
     fn entries(&self, table: &'a DeTable<'a>) -> Vec<Entry<'a>> {
         let told = self.tag.map(|(key, _)| key);
         let mut entries: Vec<_> =
@@ -147,7 +139,7 @@ impl<'a> Node<'a> {
         entries
     }
 
-    /// The variant of this table, by a key; see the head of this file.
+    /// Variant of this table; see the head of this file.
     fn tagged(
         mut self,
         table: &'a DeTable<'a>,
@@ -249,7 +241,6 @@ fn one_of(words: &[&str]) -> String {
     format!("one of {}", words.join(", "))
 }
 
-/// The names of a value's shape, as in "by shape".
 fn shapes(value: &DeValue) -> &'static [&'static str] {
     match value {
         DeValue::String(_) => &["Text", "Scalar"],
@@ -260,7 +251,6 @@ fn shapes(value: &DeValue) -> &'static [&'static str] {
     }
 }
 
-/// The elements of a list.
 struct Elements<'n, 'a> {
     node: &'n Node<'a>,
     rest: std::slice::Iter<'a, Spanned<DeValue<'a>>>,
@@ -275,11 +265,10 @@ impl<'de> SeqAccess<'de> for Elements<'_, '_> {
     }
 }
 
-/// The entries of a table.
 struct Entries<'n, 'a> {
     node: &'n Node<'a>,
     rest: std::vec::IntoIter<Entry<'a>>,
-    /// The value of the key that was read last.
+    /// Value of the last key.
     value: Option<Node<'a>>,
 }
 
@@ -299,10 +288,8 @@ impl<'de> MapAccess<'de> for Entries<'_, '_> {
     }
 }
 
-/// A variant, and the value that it is read from.
 struct Variant<'a> {
     word: &'a str,
-    /// Place of the word.
     place: Place,
     node: Node<'a>,
 }
@@ -321,7 +308,7 @@ impl<'de, 'a> EnumAccess<'de> for Variant<'a> {
 impl<'de> VariantAccess<'de> for Node<'_> {
     type Error = RigError;
 
-    /// Reads a word, or a table without keys beside the one that determined the variant.
+    /// Reads a word, or a table without keys.
     fn unit_variant(self) -> Result<(), RigError> {
         if let (DeValue::Table(table), Some(_)) = (self.value, self.tag)
             && let Some((key, _)) = self.entries(table).first()

@@ -1,4 +1,4 @@
-//! Errors of a rig or study file: the problem, its place, and a remedy.
+//! Errors of a rig or study file: problem, place and remedy.
 
 use std::fmt::Display;
 use std::ops::Range;
@@ -18,157 +18,155 @@ use serde::de::{Expected, Unexpected};
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{problem}")]
 pub struct RigError {
-    /// The problem.
+    /// Problem.
     pub problem: Box<RigProblem>,
-    /// The bytes of the document at fault; `None` when something is missing.
+    /// Bytes at fault; `None` if an item is missing.
     pub span: Option<Range<usize>>,
 }
 
 /// Problem of a rig or study file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RigProblem {
-    /// The text is not TOML.
+    /// Invalid TOML.
     #[error("{}", .0.message())]
     Toml(toml::de::Error),
-    /// A section is missing.
+    /// Missing section.
     #[error("section {section} is missing")]
     MissingSection {
         /// Name in brackets.
         section: &'static str,
     },
-    /// A section lacks a key.
+    /// Missing key.
     #[error("{} has no `{key}`", if section.is_empty() { "the file".to_owned() } else { format!("[{section}]") })]
     MissingKey {
-        /// The section and those around it, as in `surface.supports`; empty for the file itself.
+        /// Path, as in `surface.supports`; empty for the file.
         section: String,
-        /// The key.
+        /// Key.
         key: String,
     },
-    /// A key that the section does not have.
+    /// Unknown key.
     #[error("{}", unknown_key(key, known, with.as_deref()))]
     UnknownKey {
-        /// The key.
+        /// Key.
         key: String,
-        /// The keys that can stand there.
+        /// Valid keys.
         known: Vec<&'static str>,
-        /// Key and value that restrict the section to these keys, as in `kind = "beam"`; `None` if they do not depend on a value.
+        /// Key and value that restrict the keys.
         with: Option<String>,
     },
-    /// A key that has no effect with the other keys.
+    /// Key without effect.
     #[error("`{key}` does not go with {with}")]
     UnusedKey {
-        /// The key.
+        /// Key.
         key: String,
-        /// The other key or thing with which it conflicts.
+        /// Conflicting key or item.
         with: String,
     },
-    /// A word that is not a value of the key.
+    /// Unknown word.
     #[error("`{key}` is `{word}`{}", suggestion(word, known))]
     UnknownWord {
-        /// The key.
+        /// Key.
         key: String,
-        /// The word that stands there.
+        /// Word.
         word: String,
-        /// The words that may stand there.
+        /// Valid words.
         known: Vec<&'static str>,
     },
-    /// A text that is not a valid value of the key, such as a quantity in another unit.
+    /// Invalid text, such as a quantity in another unit.
     #[error("`{key}`: {reason}")]
     Invalid {
-        /// The key.
+        /// Key.
         key: String,
-        /// The reason.
+        /// Reason.
         reason: String,
     },
-    /// A value outside its bound.
+    /// Value out of range.
     #[error("`{key}` is {value}; it must be {bound}")]
     OutOfRange {
-        /// The key.
+        /// Key.
         key: String,
-        /// Value, as written.
+        /// Value as written.
         value: String,
-        /// The bound, in words.
+        /// Bound in words.
         bound: String,
     },
-    /// A surface with a side out of its range.
+    /// Side of a surface out of range.
     #[error(transparent)]
     Extent(OutOfRange),
-    /// A beam that cannot be computed.
+    /// Invalid beam.
     #[error(transparent)]
     Beam(BeamError),
-    /// A beam on supports that cannot be computed.
+    /// Invalid beam on supports.
     #[error(transparent)]
     SupportedBeam(SupportedBeamError),
-    /// A plate that cannot be computed.
+    /// Invalid plate.
     #[error(transparent)]
     Plate(PlateError),
-    /// A digit that cannot be computed.
+    /// Invalid digit.
     #[error(transparent)]
     Digit(DigitError),
-    /// A beam with a motion that cannot be computed.
+    /// Invalid beam with a motion.
     #[error(transparent)]
     ModalBeam(ModalBeamError),
-    /// A moving contact with a number out of its range.
+    /// Invalid motion.
     #[error(transparent)]
     Motion(OutOfRange),
-    /// A sensor with a number out of its range.
+    /// Invalid sensor.
     #[error(transparent)]
     Layout(LayoutError),
-    /// Sensors or a force that do not go with the surface.
+    /// Sensors or force that do not suit the surface.
     #[error(transparent)]
     Setup(SetupError),
-    /// Training positions that cannot be laid out.
+    /// Invalid training positions.
     #[error(transparent)]
     Arrangement(ArrangementError),
-    /// An insensitive sensor: its reading does not depend on the contact.
+    /// Insensitive sensor.
     #[error(
         "{kind} sensor {number} is at {} and would always read 0: {reason}",
         extent.place_in_words(*position)
     )]
     InsensitiveSensor {
-        /// Number of the sensor in its section, from 1.
+        /// Number in its section, from 1.
         number: usize,
         /// Kind.
         kind: SensorKind,
         /// Position.
         position: Position,
-        /// The surface.
+        /// Surface.
         extent: Extent,
-        /// Why.
+        /// Reason.
         reason: InsensitiveSensor,
     },
-    /// A reaction sensor at a place without a support that takes up force.
+    /// Reaction sensor without a support.
     #[error(
         "reaction sensor {number} is at {}, where no support takes up force; {}",
         extent.place_in_words(*position),
         force_takers(*extent, supports)
     )]
     NoSupport {
-        /// Number of the sensor in its section, from 1.
+        /// Number in its section, from 1.
         number: usize,
         /// Position.
         position: Position,
-        /// Positions of the supports that take up force.
+        /// Supports with a force.
         supports: Vec<Position>,
-        /// The surface.
+        /// Surface.
         extent: Extent,
     },
-    /// The rig is to be simulated, but its force is unknown.
+    /// Unknown force in a simulation.
     #[error(
         "the surface is to be simulated at these training positions, but neither [training] nor [contact] has a `force`"
     )]
     NoForce,
 }
 
-/// Place of a value in the document, and the text that is written there.
+/// Place of a value in the document.
 #[derive(Clone, Debug)]
 pub(crate) struct Place {
-    /// Path of the value: its key after those of the tables around it, joined by dots. An element has the path of its list; the document has an
-    /// empty one.
+    /// Keys joined by dots; an element has the path of its list, the document an empty one.
     pub path: String,
-    /// Bytes in the document.
     pub span: Range<usize>,
-    /// The value as messages quote it.
+    /// Value as messages quote it.
     pub written: String,
 }
 
@@ -177,35 +175,31 @@ impl Place {
         self.path.rsplit('.').next().unwrap_or_default()
     }
 
-    /// The error for a value outside its bound.
     pub fn refuse(&self, bound: impl Display) -> RigError {
         self.refuse_as(&self.written, bound)
     }
 
-    /// The error for a value outside its bound, quoted as `value` instead of as written.
+    /// As [`Place::refuse`], with `value` in the message.
     pub fn refuse_as(&self, value: impl Display, bound: impl Display) -> RigError {
         let (value, bound) = (value.to_string(), bound.to_string());
         RigProblem::OutOfRange { key: self.key().to_owned(), value, bound }.at_place(self)
     }
 
-    /// The error for an invalid value of the key, with the reason.
     pub fn invalid(&self, reason: impl Display) -> RigError {
         RigProblem::Invalid { key: self.key().to_owned(), reason: reason.to_string() }.at_place(self)
     }
 
-    /// The error for a table that lacks a key.
     pub fn missing(&self, key: &str) -> RigError {
         RigProblem::MissingKey { section: self.path.clone(), key: key.to_owned() }.at_place(self)
     }
 
-    /// The error for a key that has no effect with the other keys.
     pub fn unused(&self, with: impl Display) -> RigError {
         RigProblem::UnusedKey { key: self.key().to_owned(), with: with.to_string() }.at_place(self)
     }
 }
 
 impl RigError {
-    /// Remedy, if there is one beyond the message.
+    /// Remedy beyond the message.
     pub fn help(&self) -> Option<String> {
         match &*self.problem {
             RigProblem::UnknownKey { key, known, .. } => {
@@ -226,7 +220,7 @@ impl RigError {
         }
     }
 
-    /// Sets key and place to those of the refused value, unless a value within it is named already.
+    /// Sets key and place, unless an inner value has set them.
     pub(crate) fn with_place(mut self, place: &Place) -> Self {
         if self.span.is_some() {
             return self;
@@ -247,7 +241,7 @@ impl RigError {
         self
     }
 
-    /// Sets the place to that of an unknown key. `tag` is the key and value that determined the table's variant, and so its keys.
+    /// Sets the place of an unknown key; `tag` determined the valid keys.
     pub(crate) fn at_key(mut self, span: Range<usize>, tag: Option<(&'static str, &str)>) -> Self {
         if let (RigProblem::UnknownKey { known, with, .. }, Some((key, word))) = (&mut *self.problem, tag) {
             known.insert(0, key);
@@ -259,18 +253,16 @@ impl RigError {
 }
 
 impl RigProblem {
-    /// This problem, at a place of the document.
     pub(crate) fn at_place(self, place: &Place) -> RigError {
         RigError { problem: Box::new(self), span: Some(place.span.clone()) }
     }
 
-    /// This problem, for something that is missing.
     pub(crate) fn without_place(self) -> RigError {
         RigError { problem: Box::new(self), span: None }
     }
 }
 
-/// Refusals by types; the caller of the deserializer adds the place.
+/// Errors of types; the deserializer adds the place.
 impl serde::de::Error for RigError {
     fn custom<T: Display>(reason: T) -> Self {
         RigProblem::Invalid { key: String::new(), reason: reason.to_string() }.without_place()
@@ -312,7 +304,7 @@ impl serde::de::Error for RigError {
     }
 }
 
-/// Lists the supports that take up force: "those that do are at 0 mm and 400 mm".
+/// Lists supports: "those that do are at 0 mm and 400 mm".
 fn force_takers(extent: Extent, supports: &[Position]) -> String {
     let places: Vec<String> = supports.iter().map(|support| extent.place_in_words(*support)).collect();
     match places.as_slice() {
@@ -331,7 +323,7 @@ fn unknown_key(key: &str, known: &[&'static str], with: Option<&str>) -> String 
     }
 }
 
-/// ", did you mean `x`?" for the known word closest to `word`, or the list of known words if none is close.
+/// ", did you mean `x`?" for a close word, else the valid words.
 fn suggestion(word: &str, known: &[&'static str]) -> String {
     match closest(word, known) {
         Some(other) => format!(", did you mean `{other}`?"),
@@ -339,10 +331,10 @@ fn suggestion(word: &str, known: &[&'static str]) -> String {
     }
 }
 
-/// Invalid words, each with the valid word that it stands for.
+/// Invalid words with their valid synonyms.
 const RENAMED: [(&str, &str); 1] = [("from", "source")];
 
-/// The known word that `word` stands for or is close to: at most one edit, and one more for every four letters.
+/// Synonym, or closest word within one edit plus one per four letters.
 fn closest(word: &str, known: &[&'static str]) -> Option<&'static str> {
     let renamed = RENAMED.iter().find(|(before, now)| *before == word && known.contains(now));
     if let Some((_, now)) = renamed {

@@ -129,7 +129,6 @@ impl AutoKeys {
     }
 }
 
-/// Kinds of candidates, for messages.
 fn kinds() -> String {
     let kinds: Vec<String> =
         Estimator::KINDS.iter().filter(|kind| **kind != "auto").map(|kind| format!("`{kind}`")).collect();
@@ -197,7 +196,6 @@ impl NetworkKeys {
     }
 }
 
-/// Reads "full-scale", "standardized", or a reading in the sensors' own dimension.
 fn input_scale(scale: &At<Written>, layout: &Layout) -> Result<InputScale, RigError> {
     if let Written::Text(text) = &**scale {
         match text.as_str() {

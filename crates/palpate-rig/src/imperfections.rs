@@ -77,11 +77,9 @@ impl RelaxationKeys {
     }
 }
 
-/// Seconds in an hour.
 const HOUR_S: f64 = 3600.0;
 
 impl At<ImperfectionsKeys> {
-    /// The imperfections of a surface; `dimension` is that of its sensors if all measure the same.
     pub fn build(
         &self,
         surface: &SurfaceSpec,
@@ -153,7 +151,7 @@ impl At<ImperfectionsKeys> {
     }
 }
 
-/// A share of a channel's range, or a quantity of the sensors, times a factor.
+/// Share of a channel's range, or quantity of the sensors, times a factor.
 fn amount<B: Bound>(
     key: &Option<At<ShareOrQuantity>>,
     dimension: Option<Dimension>,

@@ -1,4 +1,4 @@
-//! Descriptions of rigs and studies, one line for each fact.
+//! Descriptions of rigs and studies, one line per fact.
 
 use palpate_estimators::description;
 
@@ -6,7 +6,7 @@ use crate::rig::Rig;
 use crate::study::Study;
 
 impl Rig {
-    /// Describes the rig: surface, sensors, force, training positions, and every setting of the estimator.
+    /// Describes the rig with all settings of the estimator.
     pub fn in_words(&self) -> Vec<String> {
         let mut lines = vec!["a rig".to_owned()];
         lines.extend(description::setup(&self.setup));
@@ -25,7 +25,7 @@ impl Rig {
 }
 
 impl Study {
-    /// Describes the study: its arms, and the setup of the first.
+    /// Describes the arms and the setup of the first.
     pub fn in_words(&self) -> Vec<String> {
         let mut lines = vec![format!(
             "the study {}: {} arms × {} seeds, judged at {} positions",

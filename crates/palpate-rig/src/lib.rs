@@ -1,8 +1,7 @@
-//! The rig file and the study file: TOML documents that describe the bench, read into the types of palpate.
+//! Rig files and study files: TOML documents of a bench and of experiments.
 //!
-//! A [`Rig`] describes the surface, the readings of its sensors, the presses that calibrate it, and the estimator; [`RigSections`]
-//! are parts of a rig, read by themselves. A [`Study`] is a rig with arms, and each arm replaces some of its sections. Values are
-//! checked as they are read. An unknown key, a wrong unit or a value outside its bounds is a [`RigError`] with its place in the text.
+//! A [`Rig`] is read whole or as [`RigSections`]; a [`Study`] has arms with sections of their own. Invalid
+//! text is a [`RigError`] with its place.
 //!
 //! ```
 //! use palpate_estimators::fit::Fit;

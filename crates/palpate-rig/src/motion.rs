@@ -37,9 +37,9 @@ pub(crate) struct MotionKeys {
     pub damping: Option<At<Fraction>>,
 }
 
-/// Greatest number of readings of a recording that is kept in memory.
+/// Limit of the readings in memory.
 const MOST_READINGS: f64 = 1e7;
-/// Defaults: share of the way that a turn takes, and duration of a touch.
+/// Defaults: share of the way for a turn, duration of a touch.
 const TURN: f64 = 0.2;
 const TOUCH_S: f64 = 0.1;
 
@@ -86,7 +86,6 @@ pub(crate) fn build(
 }
 
 impl At<MotionKeys> {
-    /// The beam that swings under this contact; its density is the surface's.
     fn modal_beam(&self, beam: Beam, density: Option<&At<Positive<Density>>>) -> Result<ModalBeam, RigError> {
         let missing = || RigProblem::MissingKey { section: "surface".to_owned(), key: "density".to_owned() };
         let density = density.ok_or_else(|| missing().at_place(&self.place))?;
@@ -95,7 +94,6 @@ impl At<MotionKeys> {
             .map_err(|error| RigProblem::ModalBeam(error).at_place(&density.place))
     }
 
-    /// A second contact, without the keys that both share.
     fn further(&self, extent: Extent, known_force_n: Option<f64>) -> Result<MovingContact, RigError> {
         match place(&self.rate).or(place(&self.damping)) {
             Some(key) => Err(key.unused("a second [[motion]]; the first sets it for both")),
@@ -144,7 +142,6 @@ mod tests {
 
     const RIG: &str = include_str!("../../../examples/moving-load.toml");
 
-    /// Problem of a rig, and the line where it is.
     fn complaint(text: &str) -> String {
         let error = Rig::from_toml(text).unwrap_err();
         let place = error.span.clone().map_or("", |span| text[span].lines().next().unwrap_or(""));
@@ -188,7 +185,6 @@ mod tests {
         insta::assert_snapshot!(told.join("\n"));
     }
 
-    /// The example with an unknown force and a second contact with `keys`.
     fn with_second(keys: &str) -> String {
         let contact = RIG.find("[contact]").unwrap()..RIG.find("\n[training]\n").unwrap();
         let text = RIG.replacen("[motion]", "[[motion]]", 1).replacen(&RIG[contact], "", 1);

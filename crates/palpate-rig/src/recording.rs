@@ -147,7 +147,7 @@ impl At<RecordingKeys> {
         })
     }
 
-    /// Checks that without a header columns are numbers; the force can be missing.
+    /// Without a header columns are numbers; the force is optional.
     fn check_numbered(&self, extent: Extent) -> Result<(), RigError> {
         let positions = [&self.position, &self.x, &self.y].into_iter().flatten();
         let nuisances = self.nuisance.iter().flat_map(|nuisances| nuisances.columns());
@@ -183,7 +183,6 @@ impl At<RecordingKeys> {
         }
     }
 
-    /// Origin and rounding; as many coordinates as the surface has.
     fn frame(&self, extent: Extent) -> Result<Frame, RigError> {
         let origin = match &self.origin {
             None => Position::default(),
@@ -221,7 +220,6 @@ impl At<RecordingKeys> {
         Ok(columns.into_iter().zip(units).map(|(column, unit)| ValueColumn { column, unit }).collect())
     }
 
-    /// Columns of the nuisance coordinates with their units; a unit without a column is an error.
     fn nuisances(&self) -> Result<Vec<ValueColumn>, RigError> {
         let Some(listed) = &self.nuisance else {
             return match &self.nuisance_unit {
@@ -253,13 +251,12 @@ impl At<RecordingKeys> {
         each.collect()
     }
 
-    /// The error for a unit at `place` that lacks its column's `key`.
     fn alone(&self, key: &str, place: &Place) -> RigError {
         let (section, key) = (self.place.path.clone(), key.to_owned());
         RigProblem::MissingKey { section, key }.at_place(place)
     }
 
-    /// The column of `key`; a unit without a column is an error.
+    /// Reads the column of `key`; a unit needs its column.
     fn value(
         &self,
         key: &str,
@@ -274,7 +271,7 @@ impl At<RecordingKeys> {
     }
 }
 
-/// The columns of a list, all different.
+/// Checks that all columns differ.
 fn distinct(listed: &[At<ColumnKey>]) -> Result<Vec<Column>, RigError> {
     let columns: Vec<_> = listed.iter().map(|column| column.column()).collect();
     if let Some(again) = (1..columns.len()).find(|i| columns[..*i].contains(&columns[*i])) {
@@ -293,7 +290,6 @@ impl ColumnKey {
     }
 }
 
-/// The stated unit, or palpate's own by default.
 fn unit(symbol: &Option<At<String>>, wanted: Dimension, own: Unit) -> Result<Unit, RigError> {
     symbol.as_ref().map_or(Ok(own), |symbol| unit_of(symbol, wanted))
 }

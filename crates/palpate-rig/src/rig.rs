@@ -1,4 +1,4 @@
-//! The rig: a bench with its calibration and estimator, read from one file.
+//! Rig: a bench with its calibration and estimator.
 
 use palpate_design::sensors::SensorDesign;
 use palpate_estimators::arrangement::Training;
@@ -15,22 +15,22 @@ use crate::error::RigError;
 use crate::sections::RigSections;
 use crate::stage::Stage;
 
-/// A bench with its sensors, training positions and estimator, all checked.
+/// Checked bench.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
     /// Surface, sensors and contact.
     pub setup: Setup,
-    /// Training positions and presses of the calibration.
+    /// Training positions and presses.
     pub training: Option<Training>,
-    /// The estimator that locates contacts.
+    /// Estimator.
     pub estimator: Estimator,
-    /// Loads that simulate a load profile.
+    /// Loads of a load profile.
     pub loads: Vec<UniformLoad>,
-    /// Motion of the contacts, and of the beam beneath them; `None` without a `[motion]`.
+    /// Motion of the contacts; `None` without `[motion]`.
     pub motion: Option<MovingContacts>,
-    /// Candidates and constraints of a sensor design; `None` without a `[design]`.
+    /// Task of a sensor design; `None` without `[design]`.
     pub design: Option<SensorDesign>,
-    /// The machine that presses the surface; `None` without a `[stage]`.
+    /// Machine that presses; `None` without `[stage]`.
     pub stage: Option<Stage>,
 }
 
@@ -38,7 +38,7 @@ impl Rig {
     /// Reads a rig file.
     ///
     /// # Errors
-    /// [`RigError`], with the place in `text`, the value and its bound.
+    /// [`RigError`] with place, value and bound.
     ///
     /// ```
     /// use palpate_rig::Rig;
@@ -60,7 +60,7 @@ impl Rig {
     /// Builds a rig from its sections.
     ///
     /// # Errors
-    /// [`RigError`] for a missing section, or for one that does not go with the others.
+    /// [`RigError`] for missing or conflicting sections.
     pub fn from_sections(sections: &RigSections) -> Result<Self, RigError> {
         let setup = sections.setup()?;
         Ok(Self {
@@ -74,10 +74,10 @@ impl Rig {
         })
     }
 
-    /// The setup during calibration, with the force of the training presses.
+    /// Setup with the force of the training presses.
     ///
     /// # Errors
-    /// [`OutOfRange`] for a force of the presses that is not greater than 0 and finite.
+    /// [`OutOfRange`] for an invalid force.
     pub fn pressed_setup(&self) -> Result<Setup, OutOfRange> {
         match &self.training {
             Some(training) => self.setup.pressed_by(training),
@@ -85,10 +85,10 @@ impl Rig {
         }
     }
 
-    /// Presses the simulated surface at the training positions, with the force of the training presses; see [`Setup::simulate`].
+    /// Simulates the training presses; see [`Setup::simulate`].
     ///
     /// # Errors
-    /// [`RigSimulationError`] when the rig has no training positions, no model or no force.
+    /// [`RigSimulationError`] without training positions, model or force.
     ///
     /// ```
     /// use palpate_rig::Rig;
@@ -104,18 +104,18 @@ impl Rig {
         self.simulate_watched(seed, Watch::NONE)
     }
 
-    /// Simulates the presses of a calibration, watched: [`Rig::simulate`] that reports progress and can be stopped.
+    /// [`Rig::simulate`] with progress and cancellation.
     ///
     /// # Errors
-    /// As for [`Rig::simulate`], and [`SimulateError::Cancelled`].
+    /// As [`Rig::simulate`], and [`SimulateError::Cancelled`].
     pub fn simulate_watched(&self, seed: u64, watch: Watch) -> Result<Recording, RigSimulationError> {
         Ok(self.setup.simulate_watched(self.training()?, seed, watch)?)
     }
 
-    /// Simulates the presses of a calibration for a fit, watched: [`Rig::simulate`] with the zero that recordings of the rig have.
+    /// [`Rig::simulate_watched`] with the zero of the rig's recordings.
     ///
     /// # Errors
-    /// As for [`Rig::simulate_watched`], and [`SimulateError::NoUntouchedRow`].
+    /// As [`Rig::simulate_watched`], and [`SimulateError::NoUntouchedRow`].
     pub fn simulate_calibration_watched(
         &self,
         seed: u64,
@@ -125,28 +125,28 @@ impl Rig {
         Ok(recorded.zeroed(self.setup.recording_columns().zero).map_err(SimulateError::from)?)
     }
 
-    /// The calibration at the training positions, for simulations.
+    /// Calibration at the training positions, for simulations.
     ///
     /// # Errors
-    /// [`RigSimulationError`] when the rig has no training positions, or they cannot be laid out.
+    /// [`RigSimulationError`] for missing or invalid training positions.
     pub fn calibration(&self) -> Result<Calibration, RigSimulationError> {
         Ok(Calibration::from_training(&self.setup, self.training()?)?)
     }
 
-    /// Simulated calibrations with `count` seeds from `seed` on. Each is judged by one contact at each position of
-    /// [`all_over`](palpate_estimators::arrangement::all_over). If the rig's force is unknown, several forces are used: see
-    /// [`Calibration::at_forces_of_use`].
+    /// Simulates calibrations with `count` seeds from `seed` on, with test contacts at
+    /// [`all_over`](palpate_estimators::arrangement::all_over); see [`Calibration::at_forces_of_use`] for an
+    /// unknown force.
     ///
     /// # Errors
-    /// [`RigSimulationError`] as for [`Rig::simulate`].
+    /// As [`Rig::simulate`].
     pub fn trials(&self, count: u64, seed: u64) -> Result<Vec<Split>, RigSimulationError> {
         self.trials_watched(count, seed, Watch::NONE)
     }
 
-    /// Simulates calibrations with `count` seeds, watched: [`Rig::trials`] that reports progress and can be stopped.
+    /// [`Rig::trials`] with progress and cancellation.
     ///
     /// # Errors
-    /// As for [`Rig::trials`], and [`SimulateError::Cancelled`].
+    /// As [`Rig::trials`], and [`SimulateError::Cancelled`].
     pub fn trials_watched(
         &self,
         count: u64,
@@ -156,18 +156,18 @@ impl Rig {
         Ok(self.calibration()?.at_forces_of_use().trials_watched(count, seed, watch)?)
     }
 
-    /// The training positions.
+    /// Training positions.
     ///
     /// # Errors
-    /// [`RigSimulationError::NoTraining`] where the rig has none.
+    /// [`RigSimulationError::NoTraining`] without any.
     pub fn training(&self) -> Result<&Training, RigSimulationError> {
         self.training.as_ref().ok_or(RigSimulationError::NoTraining)
     }
 
-    /// Simulates the moving contacts of `[motion]`; see [`palpate_estimators::simulate::simulate_moving`].
+    /// Simulates `[motion]`; see [`palpate_estimators::simulate::simulate_moving`].
     ///
     /// # Errors
-    /// [`RigSimulationError`] when the rig has no motion, no model or no force.
+    /// [`RigSimulationError`] without motion, model or force.
     ///
     /// ```
     /// use palpate_rig::Rig;
@@ -181,10 +181,10 @@ impl Rig {
         self.simulate_moving_watched(seed, Watch::NONE)
     }
 
-    /// Simulates the moving contacts, watched: [`Rig::simulate_moving`] that reports progress and can be stopped.
+    /// [`Rig::simulate_moving`] with progress and cancellation.
     ///
     /// # Errors
-    /// As for [`Rig::simulate_moving`], and [`SimulateError::Cancelled`].
+    /// As [`Rig::simulate_moving`], and [`SimulateError::Cancelled`].
     pub fn simulate_moving_watched(
         &self,
         seed: u64,
@@ -196,16 +196,16 @@ impl Rig {
     }
 }
 
-/// A rig that cannot be simulated.
+/// Error of a simulation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RigSimulationError {
-    /// The rig has no `[training]`, which determines where to press.
+    /// Missing `[training]`.
     #[error("a simulation needs training positions; the rig has no [training]")]
     NoTraining,
-    /// The rig has no `[motion]`, which determines how a contact moves.
+    /// Missing `[motion]`.
     #[error("a moving contact needs the section [motion]; the rig has none")]
     NoMotion,
-    /// The bench cannot be simulated.
+    /// Failed simulation.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
 }

@@ -1,4 +1,4 @@
-//! The sections of a rig, each read by itself, for users who have a surface and sensors, but no whole rig.
+//! Sections of a rig, each read by itself.
 
 use serde::Deserialize;
 
@@ -22,8 +22,7 @@ use crate::surface::SurfaceKeys;
 use crate::training::{ContactKeys, LoadKeys, TrainingKeys, check_force};
 use crate::values::OneOrMany;
 
-/// The sections of a rig that a text contains. Keys and single values are checked as they are read; a section is checked against the
-/// others where it is built.
+/// Sections of a rig in a text; building checks a section against the others.
 ///
 /// ```
 /// use palpate_rig::RigSections;
@@ -74,7 +73,7 @@ pub(crate) struct RigFile {
     pub imperfections: Option<At<ImperfectionsKeys>>,
 }
 
-/// Greatest number of values of a recording of the training positions that is kept in memory.
+/// Limit of the values in memory.
 const MOST_VALUES: usize = 100_000_000;
 
 impl From<RigFile> for RigSections {
@@ -87,26 +86,26 @@ impl RigSections {
     /// Reads the sections of a text.
     ///
     /// # Errors
-    /// [`RigError`] for a section, key or value that no rig can have, with its place in `text`.
+    /// [`RigError`] for an invalid section, key or value.
     pub fn from_toml(text: &str) -> Result<Self, RigError> {
         document::read("", &document::parse(text)?).map(Self)
     }
 
-    /// `[surface]`
+    /// Builds `[surface]`.
     ///
     /// # Errors
-    /// [`RigError`] without this section, or for a surface that cannot be computed.
+    /// [`RigError`] for a missing or invalid section.
     pub fn surface(&self) -> Result<SurfaceSpec, RigError> {
         self.0.surface.as_ref().ok_or_else(|| missing("[surface]"))?.build()
     }
 
-    /// `[surface]` and `[sensors]`, with the force of `[contact]`, the columns of `[recording]`, and the `[imperfections]` of simulations.
+    /// Builds a setup from `[surface]`, `[sensors]`, `[contact]`, `[recording]` and `[imperfections]`.
     ///
     /// # Errors
-    /// [`RigError`] without a surface or sensors, and for sections that do not go together.
+    /// [`RigError`] for missing or conflicting sections.
     pub fn setup(&self) -> Result<Setup, RigError> {
         let RigFile { surface, sensors, contact, recording, .. } = &self.0;
-        // The surface may be large, so missing sensors are reported before it is set up.
+        // A large surface takes time, so missing sensors are reported first.
         let surface = surface.as_ref().ok_or_else(|| missing("[surface]"))?;
         let sensors = sensors.as_ref().ok_or_else(|| missing("[sensors]"))?;
         let surface = surface.build()?;
@@ -132,10 +131,10 @@ impl RigSections {
         })
     }
 
-    /// A setup with the imperfections of `[imperfections]`, where the text has this section.
+    /// Adds `[imperfections]`, if any.
     ///
     /// # Errors
-    /// [`RigError`] for imperfections that do not go with the setup.
+    /// [`RigError`] if they do not suit the setup.
     pub fn with_imperfections(&self, setup: Setup) -> Result<Setup, RigError> {
         let Some(keys) = &self.0.imperfections else { return Ok(setup) };
         let mut dimensions = setup.layout().sensors().iter().map(|sensor| sensor.kind.dimension());
@@ -146,10 +145,10 @@ impl RigSections {
         setup.map_err(|error| RigProblem::Setup(error).at_place(&keys.place))
     }
 
-    /// `[training]` on a setup with simulated or recorded readings.
+    /// Builds `[training]`.
     ///
     /// # Errors
-    /// [`RigError`] for positions or a force that do not go with the setup.
+    /// [`RigError`] if it does not suit the setup.
     pub fn training(&self, setup: &Setup) -> Result<Option<Training>, RigError> {
         let Some(keys) = &self.0.training else { return Ok(None) };
         let surface = setup.surface();
@@ -170,44 +169,44 @@ impl RigSections {
         Ok(Some(training))
     }
 
-    /// `[estimator]` for a setup.
+    /// Builds `[estimator]`.
     ///
     /// # Errors
-    /// [`RigError`] for settings that do not go with the setup.
+    /// [`RigError`] if it does not suit the setup.
     pub fn estimator(&self, setup: &Setup) -> Result<Option<Estimator>, RigError> {
         self.0.estimator.as_ref().map(|keys| keys.build(setup.layout(), setup.force_n())).transpose()
     }
 
-    /// `[[load]]`s on a surface.
+    /// Builds `[[load]]`.
     ///
     /// # Errors
-    /// [`RigError`] for a load that does not go with the surface.
+    /// [`RigError`] if one does not suit the surface.
     pub fn loads(&self, surface: &SurfaceSpec) -> Result<Vec<UniformLoad>, RigError> {
         self.0.load.iter().map(|load| load.build(surface)).collect()
     }
 
-    /// `[motion]` on a setup; a beam swings where `[surface]`, in the same text, has a `density`.
+    /// Builds `[motion]`; a beam with a `density` vibrates.
     ///
     /// # Errors
-    /// [`RigError`] for a motion that does not go with the setup.
+    /// [`RigError`] if it does not suit the setup.
     pub fn motion(&self, setup: &Setup) -> Result<Option<MovingContacts>, RigError> {
         let density = self.0.surface.as_ref().and_then(|surface| surface.density());
         let moving = |keys| motion::build(keys, setup.surface(), density, setup.force_n());
         self.0.motion.as_ref().map(moving).transpose()
     }
 
-    /// `[design]` for a setup.
+    /// Builds `[design]`.
     ///
     /// # Errors
-    /// [`RigError`] for candidates or constraints that do not go with the setup.
+    /// [`RigError`] if it does not suit the setup.
     pub fn design(&self, setup: &Setup) -> Result<Option<SensorDesign>, RigError> {
         self.0.design.as_ref().map(|keys| keys.build(setup)).transpose()
     }
 
-    /// `[stage]`
+    /// Builds `[stage]`.
     ///
     /// # Errors
-    /// [`RigError`] for settings that no machine can reach.
+    /// [`RigError`] for settings out of range.
     pub fn stage(&self) -> Result<Option<Stage>, RigError> {
         self.0.stage.as_ref().map(StageKeys::build).transpose()
     }

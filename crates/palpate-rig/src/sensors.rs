@@ -13,7 +13,6 @@ use crate::recording::{ColumnKey, RecordingKeys};
 use crate::values::{AtLeastZero, Count, Finite, Fraction, Grid, Length, NotNegative, OneOrMany, Point};
 use crate::values::{ON_A_PLANE, Written};
 
-/// Greatest number of sensors of a section.
 const MOST: i64 = 10_000;
 
 /// Sensors of one kind.
@@ -50,7 +49,6 @@ pub(crate) struct SensorsKeys {
 #[serde(expecting = "a list of 2, the lower value first")]
 pub(crate) struct RangeKeys(At<Written>, At<Written>);
 
-/// The layout of `sections`: every sensor, with the names of the recording's channels, if there are any.
 pub(crate) fn build(
     sections: &At<OneOrMany<SensorsKeys>>,
     recording: Option<&RecordingKeys>,
@@ -85,7 +83,6 @@ pub(crate) fn build(
     Layout::new(sensors).map_err(|problem| RigProblem::Layout(problem).at_place(&sections.place))
 }
 
-/// Kind of a sensor that is to `measure` this on `surface`; an error for a kind that the surface does not have.
 pub(crate) fn kind_on(surface: &SurfaceSpec, measure: &At<SensorKind>) -> Result<SensorKind, RigError> {
     let place = &measure.place;
     match **measure {
@@ -102,7 +99,7 @@ pub(crate) fn kind_on(surface: &SurfaceSpec, measure: &At<SensorKind>) -> Result
 }
 
 impl At<SensorsKeys> {
-    /// Positions of the sensors; `channel_count` is the recording's number of channels if all are of this section.
+    /// `channel_count` is that of the recording if all are of this section.
     fn positions(
         &self,
         surface: &SurfaceSpec,
@@ -178,7 +175,6 @@ impl At<SensorsKeys> {
         })
     }
 
-    /// The dead sensors' indices within the section.
     fn dead(&self, count: usize) -> Result<Vec<usize>, RigError> {
         let index = |number: &At<i64>| match usize::try_from(**number) {
             Ok(from_1 @ 1..) if from_1 <= count => Ok(from_1 - 1),
@@ -188,7 +184,7 @@ impl At<SensorsKeys> {
     }
 }
 
-/// Checks that a reaction sensor sits at a support of a modelled surface, and any other sensor where the surface moves.
+/// A reaction sensor must be at a support, another one where the surface deforms.
 fn check_sensor(
     surface: &SurfaceSpec,
     kind: SensorKind,

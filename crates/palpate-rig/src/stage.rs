@@ -8,34 +8,34 @@ use crate::document::At;
 use crate::error::RigError;
 use crate::values::{Force, Length, Positive, Quantity, Speed};
 
-/// Place of a surface in a machine, how it presses there, and its limits; lengths in metres, in the machine's coordinates.
+/// Machine that presses a surface; lengths in metres in its coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stage {
-    /// x and y of the finger over the surface's left support, or over its lower left corner.
+    /// x and y of the finger over the left support or lower left corner.
     pub origin_m: (f64, f64),
-    /// z of the finger as it touches the untouched surface.
+    /// z of the finger at the first touch.
     pub touch_z_m: f64,
     /// Height of travel above `touch_z_m`; greater than 0.
     pub clearance_m: f64,
-    /// Depths of the presses below `touch_z_m`, at least one; greater than 0.
+    /// Depths below `touch_z_m`, at least one; greater than 0.
     pub depths_m: Vec<f64>,
-    /// Speed of travel in m/s; greater than 0.
+    /// Speed of travel, m/s; greater than 0.
     pub travel_m_per_s: f64,
-    /// Speed of pressing in m/s; greater than 0.
+    /// Speed of pressing, m/s; greater than 0.
     pub press_m_per_s: f64,
-    /// Name of the load cell's values in the frames, which are in newtons; `None` without one.
+    /// Name of the load cell's values (N) in the frames.
     pub load_cell: Option<String>,
-    /// Greatest force at the load cell; the machine is stopped above it; greater than 0.
+    /// Force above which the machine stops, N; greater than 0.
     pub force_limit_n: Option<f64>,
-    /// Whether a stop may reset the machine by the DTR line of its serial port.
+    /// True if a stop can reset the machine by the DTR line.
     pub dtr_reset: bool,
 }
 
 impl Stage {
-    /// Checks that every number is in its range.
+    /// Checks the range of every number.
     ///
     /// # Errors
-    /// [`OutOfRange`] for the first that is not.
+    /// [`OutOfRange`] for the first invalid number.
     pub fn check(&self) -> Result<(), OutOfRange> {
         let (x_m, y_m) = self.origin_m;
         let places = [("x of the origin", x_m), ("y of the origin", y_m), ("z of the touch", self.touch_z_m)];
@@ -50,17 +50,17 @@ impl Stage {
         OutOfRange::check_positive(positive.into_iter().chain(depths).chain(limit))
     }
 
-    /// The greatest depth.
+    /// Largest depth, m.
     pub fn deepest_m(&self) -> f64 {
         self.depths_m.iter().copied().fold(0.0, f64::max)
     }
 
-    /// Height of travel, in metres of the machine.
+    /// z of travel, m.
     pub fn travel_z_m(&self) -> f64 {
         self.touch_z_m + self.clearance_m
     }
 
-    /// Lowest height of the finger, that of the deepest press, in metres of the machine.
+    /// z of the deepest press, m.
     pub fn lowest_z_m(&self) -> f64 {
         self.touch_z_m - self.deepest_m()
     }
@@ -95,9 +95,7 @@ pub(crate) struct StageKeys {
 #[serde(expecting = "a list of 2, x and y in the machine")]
 pub(crate) struct OriginKeys(Quantity<Length>, Quantity<Length>);
 
-/// Greatest number of depths at one position.
 const MOST_DEPTHS: usize = 1000;
-/// Defaults of the height of travel and of the speeds.
 const CLEARANCE_M: f64 = 5e-3;
 const TRAVEL_M_PER_S: f64 = 20e-3;
 const PRESS_M_PER_S: f64 = 1e-3;

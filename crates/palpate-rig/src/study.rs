@@ -1,4 +1,4 @@
-//! The study file: a rig's sections, an `[evaluation]`, and `[[arm]]`s that replace some of them.
+//! Study file: sections of a rig, an `[evaluation]`, and `[[arm]]`s.
 
 use std::ops::Range;
 
@@ -25,57 +25,57 @@ use crate::surface::SurfaceKeys;
 use crate::training::{ContactKeys, TrainingKeys};
 use crate::values::{Count, Length, OneOrMany, Positive};
 
-/// A set of experiments: every arm is a rig, fitted once for each seed.
+/// Set of arms, each fitted once for each seed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Study {
     /// Name.
     pub name: String,
-    /// Seeds 0 to this less 1 by default; at least 1.
+    /// Default number of seeds; at least 1.
     pub seeds: u64,
-    /// The arithmetic of training in lanes.
+    /// Arithmetic of training in lanes.
     pub precision: Precision,
-    /// Positions and tolerance by which the locators are judged.
+    /// Positions and tolerance of the evaluation.
     pub judging: Judging,
     /// Arms, at least 1, with different names.
     pub arms: Vec<Arm>,
-    /// SHA-256 of the study file, in hexadecimal.
+    /// SHA-256 of the study file, hexadecimal.
     pub digest: String,
 }
 
 /// One row of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arm {
-    /// Name, unique in the study.
+    /// Unique name.
     pub name: String,
-    /// Rig that is fitted; when the study is prepared, a layout by method replaces the rig's own.
+    /// Rig; preparation replaces its layout by the requested one.
     pub rig: Rig,
-    /// The layout by method, if the arm has one.
+    /// Requested layout by method.
     pub layout: Option<AskedLayout>,
-    /// The title of the figure that the arm shares with others in reports; `None` for a figure of its own.
+    /// Title of a shared figure in reports, if any.
     pub figure: Option<String>,
 }
 
-/// A layout that a method determines.
+/// Request of a layout by a method.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AskedLayout {
-    /// The method.
+    /// Method.
     pub method: Method,
-    /// The bytes of the study file that state the method.
+    /// Bytes of the method in the study file.
     pub span: Range<usize>,
 }
 
-/// Positions and tolerance by which a study's locators are judged.
+/// Positions and tolerance of a study's evaluation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judging {
-    /// Contact positions, evenly spaced.
+    /// Even contact positions.
     pub positions: Vec<Position>,
-    /// Readings at each position, where sensors have noise; at least 1.
+    /// Readings per position with noisy sensors; at least 1.
     pub readings: usize,
-    /// Largest error in metres that counts for the effective length.
+    /// Tolerance of the effective length, m.
     pub tolerance_m: f64,
-    /// Portions of the surface that are also judged by themselves.
+    /// Portions with separate errors.
     pub portions: Vec<Portion>,
-    /// Whether errors between the outermost training positions, and beyond them, are also judged by themselves.
+    /// True for separate errors inside and outside the training span.
     pub training_span: bool,
 }
 
@@ -163,7 +163,7 @@ impl Study {
     /// Reads a study file.
     ///
     /// # Errors
-    /// [`RigError`], with the place in `text`, the value and its bound.
+    /// [`RigError`] with place, value and bound.
     ///
     /// ```
     /// use palpate_rig::Study;
@@ -199,7 +199,6 @@ impl Study {
     }
 }
 
-/// The estimator of an arm: its own keys, and the base's keys that it does not have.
 fn estimator(document: &DeValue, arm: usize) -> Result<Option<EstimatorKeys>, RigError> {
     let base = document.get("estimator");
     let own = document.get("arm").and_then(|arms| arms.get_ref().get(arm)?.get_ref().get("estimator"));
@@ -220,7 +219,6 @@ fn estimator(document: &DeValue, arm: usize) -> Result<Option<EstimatorKeys>, Ri
 }
 
 impl ArmKeys {
-    /// Builds an arm from the base's sections; those of the arm replace them.
     fn build(&self, base: &StudyFile, estimator: Option<EstimatorKeys>) -> Result<Arm, RigError> {
         let name = checked_arm_name(&self.name)?;
         let rig = RigFile {
@@ -243,7 +241,7 @@ impl ArmKeys {
         Ok(Arm { name, rig, layout, figure: self.figure.clone() })
     }
 
-    /// The layout by method; positions of sensors are an error beside it.
+    /// Sensor positions exclude a layout by method.
     fn asked_layout(&self) -> Result<Option<AskedLayout>, RigError> {
         let Some(layout) = &self.layout else { return Ok(None) };
         for sensors in self.sensors.iter().flat_map(|sensors| sensors.sections()) {
@@ -255,7 +253,6 @@ impl ArmKeys {
     }
 }
 
-/// The name of a study, which is also that of its folder.
 fn checked_name(name: &At<String>) -> Result<String, RigError> {
     if name.is_empty() || !name.chars().all(in_any_name) {
         return Err(name.place.refuse("of letters, digits, `-` and `_`"));
@@ -263,7 +260,7 @@ fn checked_name(name: &At<String>) -> Result<String, RigError> {
     Ok((**name).clone())
 }
 
-/// The name of an arm, which may be part of a file's name: points are within it only, so that it is neither hidden nor a folder.
+/// An arm's name can be part of a file name: inner points only, to exclude hidden files and folders.
 fn checked_arm_name(name: &At<String>) -> Result<String, RigError> {
     let fits = |c: char| in_any_name(c) || c == '.';
     if name.is_empty() || !name.chars().all(fits) || name.starts_with('.') || name.ends_with('.') {
@@ -277,7 +274,6 @@ fn in_any_name(c: char) -> bool {
 }
 
 impl StudyFile {
-    /// The `[evaluation]`; by default 399 positions, 5 readings at each, tolerance 2 mm, no portions.
     fn judging(&self, first: &Arm) -> Result<Judging, RigError> {
         let extent = first.rig.setup.surface().extent();
         if let (Some(surface), Extent::Plane { .. }) = (&self.surface, extent) {
@@ -303,7 +299,6 @@ impl StudyFile {
 
 impl EvaluationKeys {
     fn positions(&self, length_m: f64) -> Result<Vec<Position>, RigError> {
-        /// Greatest number of contact positions by which a study judges.
         const MOST: usize = 100_000;
         let (from_m, to_m, step_m) = (self.from.si, self.to.si, self.step.si);
         if to_m < from_m || to_m > length_m {

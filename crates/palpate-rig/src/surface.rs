@@ -221,7 +221,6 @@ impl At<SurfaceKeys> {
         }
     }
 
-    /// The density of a beam; `None` without one.
     pub fn density(&self) -> Option<&At<Positive<Density>>> {
         match &**self {
             SurfaceKeys::Beam(keys) => keys.density.as_ref(),
@@ -280,7 +279,6 @@ impl BeamKeys {
         Ok(SurfaceSpec::SupportedBeam(Box::new(beam)))
     }
 
-    /// Place in the document of the part at fault.
     fn place_of(&self, part: BeamPart) -> Option<&Place> {
         match part {
             BeamPart::Whole => None,
@@ -299,7 +297,6 @@ impl BeamKeys {
 }
 
 impl BeamSupportKeys {
-    /// The support, and the place of its position in the document.
     fn build(&self) -> (&Place, BeamSupport) {
         let (at, kind) = match self {
             Self::Simple { at } => (at, BeamSupportKind::Simple),
@@ -349,7 +346,6 @@ impl PlateKeys {
         }
     }
 
-    /// Place in the document of the key at fault.
     fn place_of(&self, error: PlateError) -> Option<&Place> {
         match error {
             PlateError::SupportOffPlate { number, .. }

@@ -1,10 +1,10 @@
-//! Tables in words, without a rig that defines their columns.
+//! Descriptions of tables without a rig.
 
 use crate::first_rig::{FirstRig, Hints};
 use crate::rig::Rig;
 use palpate_estimators::recording::{CsvError, Header, Table};
 
-/// Describes a table: comments, numbers of rows and columns, headings, and repeated readings if its headings are those of a recording.
+/// Describes a table: comments, size, headings, and repeated readings of a recording.
 ///
 /// ```
 /// let lines = palpate_rig::table_in_words("presses.csv", b"x,left,right\n1,20,30\n2,19,31\n")?;
@@ -13,7 +13,7 @@ use palpate_estimators::recording::{CsvError, Header, Table};
 /// ```
 ///
 /// # Errors
-/// [`CsvError`], with line and column, for bytes that are not a table.
+/// [`CsvError`] with line and column.
 pub fn table_in_words(name: &str, bytes: &[u8]) -> Result<Vec<String>, CsvError> {
     let text = String::from_utf8_lossy(bytes);
     let comments = text.lines().take_while(|line| line.starts_with('#'));
@@ -32,7 +32,6 @@ pub fn table_in_words(name: &str, bytes: &[u8]) -> Result<Vec<String>, CsvError>
     Ok(lines)
 }
 
-/// Number of rows that repeat the reading before them, if the table's headings are those of a recording.
 fn repeated_readings(name: &str, bytes: &[u8]) -> Option<String> {
     let first = FirstRig::guess(name, bytes, &Hints::default()).ok()?;
     let rig = Rig::from_toml(&first.to_toml(name)).ok()?;

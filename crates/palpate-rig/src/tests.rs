@@ -111,7 +111,7 @@ fn the_water_strips_recording_is_read() {
     assert_eq!(held_out, [9 * 19, 8 * 19, 8 * 19, 8 * 19, 8 * 19]);
 }
 
-/// The message, then the first line at fault with a mark under it, then the help.
+/// Formats message, marked line and help.
 fn pointed(text: &str) -> String {
     let error = Rig::from_toml(text).unwrap_err();
     let mut shown = error.to_string();
@@ -129,7 +129,6 @@ fn pointed(text: &str) -> String {
     shown
 }
 
-/// A bench on which everything can be changed.
 const BENCH: &str = r#"[surface]
 kind = "beam"
 length = "400 mm"
@@ -147,7 +146,7 @@ count = 10
 kind = "network"
 "#;
 
-/// Each change replaces one piece of the bench by another.
+/// Reads the base with replaced pieces.
 fn refused(base: &str, changes: &[(&str, &str)]) -> String {
     let shown = changes.iter().map(|(from, to)| {
         assert!(base.contains(from), "{from}");
@@ -410,7 +409,7 @@ proptest::proptest! {
         let _ = Rig::from_toml(&String::from_utf8_lossy(&bytes));
     }
 
-    /// Cuts and swaps within real rigs reach more code than random bytes.
+    /// Edits of valid rigs reach more code than random bytes.
     #[test]
     fn no_damaged_rig_panics(from in 0..BENCH.len(), length in 0..30usize, patch in "[-\"0-9a-zN%\\[\\]=. \n]{0,12}") {
         for rig in [BENCH, PAPER, FSI_WATER] {

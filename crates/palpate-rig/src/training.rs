@@ -11,7 +11,6 @@ use crate::document::{At, place};
 use crate::error::{Place, RigError, RigProblem};
 use crate::values::{Count, Force, Grid, Length, ON_A_PLANE, Point, Positive, Quantity, Ratio, check_order};
 
-/// Greatest number of training positions, and of presses of one position.
 const MOST: i64 = 100_000;
 
 /// The contacts to be located.
@@ -33,7 +32,6 @@ pub(crate) struct ContactKeys {
 pub(crate) struct ForceRangeKeys(Positive<Force>, Positive<Force>);
 
 impl ContactKeys {
-    /// Range of unknown forces, where it is stated.
     pub fn force_range(&self, surface: &SurfaceSpec) -> Result<Option<ForceRange>, RigError> {
         let Some(range) = &self.force_range else { return Ok(None) };
         if self.force.is_some() {
@@ -54,7 +52,6 @@ impl ContactKeys {
         })
     }
 
-    /// The greatest force in newtons; `None` if it is not stated.
     pub fn greatest_force_n(&self, surface: &SurfaceSpec) -> Result<Option<f64>, RigError> {
         let Some(greatest) = &self.greatest_force else { return Ok(None) };
         if self.force.is_some() {
@@ -181,7 +178,7 @@ impl At<TrainingKeys> {
         Ok(training)
     }
 
-    /// The standard deviation of the placement, which is less than the surface's longest side: a larger one would not restrict the place.
+    /// An error above the longest side would not restrict the place.
     fn placement_sd_m(&self, extent: Extent) -> Result<Option<f64>, RigError> {
         let Some(placement) = &self.placement else { return Ok(None) };
         let side_m = extent.length_m().max(extent.width_m().unwrap_or(0.0));
@@ -194,7 +191,6 @@ impl At<TrainingKeys> {
         }
     }
 
-    /// Refuses keys of other rules.
     fn refuse_unused(&self, rule: Rule) -> Result<(), RigError> {
         let (name, meant): (_, &[&str]) = match rule {
             Rule::Even => ("even", &["portion"]),
@@ -210,7 +206,6 @@ impl At<TrainingKeys> {
         }
     }
 
-    /// The key that `error` is about.
     fn place_of(&self, error: &ArrangementError) -> Option<&Place> {
         match error {
             ArrangementError::MiddleTooSmall { .. } => place(&self.middle),
@@ -220,7 +215,7 @@ impl At<TrainingKeys> {
     }
 }
 
-/// Refuses a force beyond the range of a digit's model, which ends at a load of [`Digit::MOST_LOAD`] at the tip.
+/// Limits the force to a digit's model: [`Digit::MOST_LOAD`] at the tip.
 pub(crate) fn check_force(
     force: Option<&At<Positive<Force>>>,
     surface: &SurfaceSpec,

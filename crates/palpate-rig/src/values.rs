@@ -1,4 +1,4 @@
-//! The values of a file's keys, as types that read and check themselves: quantities with units, counts, positions.
+//! Values of keys as types with checks.
 
 use std::marker::PhantomData;
 
@@ -11,29 +11,24 @@ use serde::de::{Deserialize, Deserializer, Error, Unexpected};
 use crate::document::At;
 use crate::error::{Place, RigError};
 
-/// A quantity in SI units that measures `D` and satisfies the bound `B`: "400 mm" becomes 0.4.
+/// Quantity in SI units of dimension `D` within bound `B`: "400 mm" becomes 0.4.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Quantity<D, B = Finite> {
     pub si: f64,
     of: PhantomData<(D, B)>,
 }
 
-/// A quantity greater than 0.
 pub(crate) type Positive<D> = Quantity<D, AboveZero>;
-/// A quantity of at least 0.
 pub(crate) type NotNegative<D> = Quantity<D, AtLeastZero>;
-/// A share or a percentage, at least 0 and below 1.
 pub(crate) type Fraction = Quantity<Ratio, BelowOne>;
 
-/// A false-alarm rate, as a share or a percentage.
 pub(crate) type FalseAlarms = Quantity<Ratio, AlarmRange>;
 
-/// Dimension of a quantity.
 pub(crate) trait Measure {
     const DIMENSION: Dimension;
 }
 
-/// Bound of a quantity: in words, and as a test of a value in SI units.
+/// Bound in words and as a test of SI values.
 pub(crate) trait Bound {
     const WORDS: &'static str;
     fn holds(si: f64) -> bool;
@@ -73,7 +68,6 @@ bounds! {
     TailFreedom: "greater than 2" if |si| si > 2.0;
 }
 
-/// The range of false-alarm rates.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum AlarmRange {}
 
@@ -103,7 +97,7 @@ pub(crate) enum Written {
     Number(f64),
 }
 
-/// A share of the range of the sensors, or a quantity that they measure.
+/// Share of the sensors' range, or quantity of the sensors.
 pub(crate) type ShareOrQuantity = Written;
 
 impl Written {
@@ -120,7 +114,6 @@ impl Written {
 }
 
 impl At<Written> {
-    /// The SI value of a quantity that measures `wanted` and satisfies the bound `B`.
     pub fn si<B: Bound>(&self, wanted: Dimension) -> Result<f64, RigError> {
         match Written::si(self, wanted) {
             Ok(si) if B::holds(si) => Ok(si),
@@ -130,7 +123,6 @@ impl At<Written> {
     }
 }
 
-/// A whole number within bounds.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Count<const LEAST: i64, const MOST: i64>(usize);
 
@@ -154,7 +146,6 @@ impl<'de, const LEAST: i64, const MOST: i64> Deserialize<'de> for Count<LEAST, M
     }
 }
 
-/// Text for messages: a number of positions does not go with a plane, and the remedy.
 pub(crate) const ON_A_PLANE: &str =
     "a plane; set `grid = [3, 3]`, columns and rows, or list pairs in `positions`";
 
@@ -164,7 +155,6 @@ pub(crate) const ON_A_PLANE: &str =
 pub(crate) struct Grid<const MOST: i64>(Count<1, MOST>, Count<1, MOST>);
 
 impl<const MOST: i64> At<Grid<MOST>> {
-    /// Columns and rows.
     pub fn sides(&self, extent: Extent) -> Result<(usize, usize), RigError> {
         if let Extent::Line { .. } = extent {
             return Err(self.place.unused("a surface that is a line; set `count`"));
@@ -187,7 +177,7 @@ pub(crate) enum Point {
 }
 
 impl At<Point> {
-    /// The position on a surface of this `extent`, or beside it.
+    /// Returns the unchecked position.
     pub fn position(&self, extent: Extent) -> Result<Position, RigError> {
         match (extent, &**self) {
             (Extent::Line { .. }, Point::Scalar(x)) => Ok(Position::along(x.si)),
@@ -201,7 +191,7 @@ impl At<Point> {
         }
     }
 
-    /// The position; an error for one beside the surface.
+    /// Returns the position, checked.
     pub fn on_surface(&self, extent: Extent) -> Result<Position, RigError> {
         match self.position(extent)? {
             position if extent.contains(position) => Ok(position),
@@ -213,7 +203,7 @@ impl At<Point> {
     }
 }
 
-/// Checks that a stretch or rectangle goes from left to right, and upward on a plane; `place` is that of its end.
+/// Checks that a section or rectangle goes right and up; `place` is its end.
 pub(crate) fn check_order(
     from: Position,
     to: Position,

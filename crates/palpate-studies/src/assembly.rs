@@ -1,4 +1,4 @@
-//! Assembly of a study from parts: rows of tasks from any process, or the tables of shards.
+//! Assembly of a study from tasks or shards.
 
 use std::collections::{HashMap, HashSet};
 
@@ -11,74 +11,74 @@ use super::task::{Shard, Task};
 /// Error of assembling a study.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AssemblyError {
-    /// A table that is not of this study, or contains a row that it does not write.
+    /// Invalid table or row.
     #[error("{place}: {}: {error}", error.table().file_name())]
     Table {
         /// Place of the table.
         place: String,
-        /// The problem.
+        /// Problem.
         error: CheckpointError,
     },
-    /// A table of a whole study.
+    /// Table of a whole study.
     #[error("{place}: {} is of a whole study, not of a shard", TableKind::Networks.file_name())]
     Whole {
         /// Place of the table.
         place: String,
     },
-    /// Shards of different numbers of shards or of seeds.
+    /// Shards of different splits or numbers of seeds.
     #[error("{place} is shard {found}, and {first_place} is shard {first}: all must be of one split")]
     Split {
         /// Place of the second shard.
         place: String,
-        /// The second shard, with its seeds.
+        /// Second shard and seeds.
         found: String,
         /// Place of the first shard.
         first_place: String,
-        /// The first shard, with its seeds.
+        /// First shard and seeds.
         first: String,
     },
-    /// One shard in two places.
+    /// Duplicate shard.
     #[error("shard {shard} is there twice: {first_place} and {place}")]
     TwoOfAShard {
-        /// The shard.
+        /// Shard.
         shard: String,
-        /// The first place.
+        /// First place.
         first_place: String,
-        /// The second place.
+        /// Second place.
         place: String,
     },
-    /// A shard with missing fits, because it was stopped before its end.
+    /// Shard with missing fits.
     #[error("{place}: shard {shard} is not finished: it has {found} of its {wanted} fits")]
     Unfinished {
         /// Place of the shard.
         place: String,
-        /// The shard.
+        /// Shard.
         shard: String,
-        /// Number of its finished fits.
+        /// Number of finished fits.
         found: u64,
-        /// Number of all its fits.
+        /// Number of all fits.
         wanted: u64,
     },
     /// Missing shards.
     #[error("{} of {of} shards {} missing: {}", .missing.len(), if .missing.len() == 1 { "is" } else { "are" }, listed(.missing))]
     MissingShards {
-        /// Their numbers.
+        /// Shard numbers.
         missing: Vec<u64>,
-        /// Number of shards.
+        /// Number of all shards.
         of: u64,
     },
-    /// Two results of one fit.
+    /// Duplicate fit.
     #[error("the fit of arm `{arm}` from seed {seed} is there twice")]
     TwoOfAFit {
-        /// The arm.
+        /// Arm.
         arm: String,
-        /// The seed.
+        /// Seed.
         seed: u64,
     },
     /// Missing fits.
     #[error("{found} of {wanted} fits exist; the first that is missing is of arm `{arm}` from seed {seed}")]
     MissingFits {
-        /// Number of the present fits.
+        /// Number of present fits.
         found: usize,
         /// Number of all fits.
         wanted: usize,
@@ -87,12 +87,11 @@ pub enum AssemblyError {
         /// Seed of that fit.
         seed: u64,
     },
-    /// No shard at all.
+    /// No shards.
     #[error("expected at least 1 shard, found 0")]
     Nothing,
 }
 
-/// Numbers as text, at most the first ten.
 fn listed(numbers: &[u64]) -> String {
     const MOST: usize = 10;
     let mut shown: Vec<String> = numbers.iter().take(MOST).map(u64::to_string).collect();
@@ -102,25 +101,24 @@ fn listed(numbers: &[u64]) -> String {
     shown.join(", ")
 }
 
-/// The tables of a shard, and their place.
+/// Tables of a shard.
 #[derive(Clone, Debug)]
 pub struct ShardTables {
-    /// Name of the place, for messages.
+    /// Place, for messages.
     pub place: String,
-    /// The whole texts, with their headings.
+    /// Whole texts with headings.
     pub texts: FitRows,
 }
 
-/// A study merged from shards.
+/// Study merged from shards.
 #[derive(Clone, Debug)]
 pub struct MergedStudy {
     /// All fits.
     pub fits: Vec<Trained>,
-    /// Number of seeds of every arm: 0 to this less 1.
+    /// Number of seeds of every arm.
     pub seeds: u64,
 }
 
-/// A shard with its tables read.
 struct ReadShard<'t> {
     place: &'t str,
     shard: Shard,
@@ -135,7 +133,7 @@ impl ReadShard<'_> {
 }
 
 impl PreparedStudy {
-    /// Runs a task and returns the rows of its fits, by rising seed. They do not depend on the process or the number of threads.
+    /// Runs a task and returns its rows by rising seed, independent of process and threads.
     ///
     /// ```
     /// use palpate_numerics::watch::Watch;
@@ -154,7 +152,7 @@ impl PreparedStudy {
     /// ```
     ///
     /// # Errors
-    /// [`StudyRunError`], also when `watch` stopped the task.
+    /// [`StudyRunError`], also if cancelled.
     pub fn run_task(&self, task: &Task, threads: usize, watch: Watch) -> Result<FitRows, StudyRunError> {
         let mut fits = self.fit_tasks(std::slice::from_ref(task), &[], threads, &|_| {}, watch)?;
         fits.sort_by_key(|trained| trained.fit.seed);
@@ -164,10 +162,10 @@ impl PreparedStudy {
         Ok(rows)
     }
 
-    /// Assembles the outcomes of a study of `seeds` seeds from the rows of all its tasks, in any order and without headings.
+    /// Assembles a study from the rows of all tasks, in any order and without headings.
     ///
     /// # Errors
-    /// [`AssemblyError`] for rows that are not of this study, and for missing or repeated fits.
+    /// [`AssemblyError`] for foreign, missing or duplicate rows.
     pub fn assemble(&self, seeds: u64, rows: &FitRows) -> Result<Vec<ArmOutcome>, AssemblyError> {
         let tables = StudyTables::new(self);
         let mut texts = tables.headings();
@@ -179,10 +177,10 @@ impl PreparedStudy {
         Ok(self.by_arm(checkpoint.done, seeds))
     }
 
-    /// Merges the fits of a study from the tables of all its shards.
+    /// Merges the tables of all shards.
     ///
     /// # Errors
-    /// [`AssemblyError`] for shards of another study or another split, and for missing, unfinished or repeated ones.
+    /// [`AssemblyError`] for foreign, missing, unfinished or duplicate shards.
     pub fn merge(&self, shards: &[ShardTables]) -> Result<MergedStudy, AssemblyError> {
         let read = shards.iter().map(|tables| self.read_shard(tables)).collect::<Result<Vec<_>, _>>()?;
         let first = read.first().ok_or(AssemblyError::Nothing)?;
@@ -212,7 +210,6 @@ impl PreparedStudy {
         Ok(MergedStudy { fits: read.into_iter().flat_map(|shard| shard.fits).collect(), seeds })
     }
 
-    /// Reads the fits of a finished shard.
     fn read_shard<'t>(
         &self,
         ShardTables { place, texts }: &'t ShardTables,
@@ -234,7 +231,6 @@ impl PreparedStudy {
         Ok(ReadShard { place, shard, seeds, fits })
     }
 
-    /// Checks that every fit of `seeds` seeds is there once.
     fn check_complete(&self, fits: &[Trained], seeds: u64) -> Result<(), AssemblyError> {
         let name = |arm: usize| self.study.arms[arm].name.clone();
         let mut there = HashSet::new();

@@ -1,8 +1,6 @@
-//! Dead areas: is the surface between sensors located as well as the surface over them?
+//! Dead areas between sensors, as functions of the estimator (Brett and Li).
 //!
-//! After Brett and Li: whether there are dead areas depends on the interpretation of the readings, not on the number of sensors.
-//! Every estimator is calibrated on the same bench with 2, 4, 8, … sensors. For comparison, an [`ArraySensor`] has sensors that
-//! each respond only to contacts near them. Errors are then folded over all gaps between sensors.
+//! Estimators are calibrated with several sensor counts, and on an [`ArraySensor`] with local responses.
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -20,27 +18,27 @@ use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind};
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_rig::{Rig, RigSimulationError};
 
-/// The bench of the study, as a rig.
+/// Rig of the study.
 pub const RIG_TOML: &str = include_str!("dead-areas.toml");
 /// Sensor counts of the study.
 pub const COUNTS: [usize; 4] = [2, 4, 8, 16];
-/// Standard deviation of the array sensor's point spread in metres, for the arrays with the same spread at every count.
+/// Point spread that is equal at every count, m.
 const FIXED_SPREAD_M: f64 = 0.01;
-/// Presentations after which a network trained by back-propagation stops.
+/// Limit of presentations of a network.
 const MOST_PRESENTATIONS: usize = 2_000_000;
 
 /// Settings of the study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeadAreas {
-    /// Beam, noise, force and training positions; kind and noise of its sensors are used, their number is not.
+    /// Rig; the number of sensors is replaced.
     pub rig: Rig,
     /// Sensor counts.
     pub counts: Vec<usize>,
-    /// Calibrations at each count, each with noise of its own.
+    /// Calibrations per count.
     pub calibrations: u64,
-    /// Largest error in metres that counts for the effective length.
+    /// Tolerance of the effective length, m.
     pub tolerance_m: f64,
-    /// Kinds of estimators to leave out.
+    /// Kinds of excluded estimators.
     pub without: Vec<&'static str>,
     /// Seed of noise and fits.
     pub seed: u64,
@@ -49,36 +47,36 @@ pub struct DeadAreas {
 /// Errors of one estimator at one sensor count.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DeadAreaRow {
-    /// "distributive", or a description of the array sensor's point spread.
+    /// "distributive", or the point spread in words.
     pub sensing: String,
-    /// The estimator's kind.
+    /// Kind of the estimator.
     pub estimator: &'static str,
     /// Sensors.
     pub sensors: usize,
-    /// Share of the contacts located within the tolerance, in %.
+    /// Share of the contacts within the tolerance, %.
     pub effective_percent: f64,
-    /// Mean error in metres.
+    /// Mean error, m.
     pub mean_error_m: f64,
-    /// Errors folded over the gaps between sensors.
+    /// Errors folded over the gaps.
     pub folded: FoldedErrors,
 }
 
 /// Results of the study.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DeadAreaResults {
-    /// One row for each estimator and count.
+    /// Rows by estimator and count.
     pub rows: Vec<DeadAreaRow>,
-    /// Estimators that could not be fitted: sensing, kind, count and reason.
+    /// Failed fits: sensing, kind, count and reason.
     pub left_out: Vec<(String, &'static str, usize, String)>,
 }
 
-/// Error of a study of dead areas.
+/// Error of the study.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DeadAreasError {
-    /// The rig cannot be simulated.
+    /// Failed simulation.
     #[error(transparent)]
     Simulate(#[from] RigSimulationError),
-    /// The study was stopped.
+    /// Cancelled.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
@@ -87,7 +85,7 @@ impl DeadAreas {
     /// Runs the study.
     ///
     /// # Errors
-    /// [`DeadAreasError`] for a rig without a model, a force or training positions, or when `watch` stopped it.
+    /// [`DeadAreasError`] without model, force or training positions, or if cancelled.
     pub fn run(&self, watch: Watch) -> Result<DeadAreaResults, DeadAreasError> {
         let mut findings = DeadAreaResults { rows: Vec::new(), left_out: Vec::new() };
         for &count in &self.counts {
@@ -106,7 +104,7 @@ impl DeadAreas {
         Ok(findings)
     }
 
-    /// Greatest number of rounds of the fits in [`DeadAreas::run`], each reported to `watch`.
+    /// Largest number of rounds that [`DeadAreas::run`] reports.
     pub fn most_rounds(&self) -> u64 {
         let rounds = |count: &usize| {
             let estimators = self.estimators(&self.with_sensors(*count));
@@ -115,7 +113,6 @@ impl DeadAreas {
         self.calibrations * self.counts.iter().map(rounds).sum::<u64>()
     }
 
-    /// The rig with `count` sensors of its first kind, evenly placed.
     fn with_sensors(&self, count: usize) -> Rig {
         let mut rig = self.rig.clone();
         let length_m = rig.setup.surface().extent().length_m();
@@ -141,7 +138,6 @@ impl DeadAreas {
         estimators
     }
 
-    /// Adds an estimator's row.
     fn judge(
         &self,
         sensing: &str,
@@ -173,32 +169,30 @@ impl DeadAreas {
     }
 }
 
-/// Width of a sensor's point spread: its standard deviation.
+/// Standard deviation of a sensor's point spread.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PointSpread {
-    /// In metres, independent of the pitch.
+    /// In metres.
     Metres(f64),
     /// In pitches of the array.
     Pitches(f64),
 }
 
-/// A line of n sensors at (i + ½)·l/n. Sensor i reads exp(−(a − x_i)²/(2·s²)) for a contact at a, so that its response over itself is
-/// 1, plus Gaussian noise; s is its point spread. The surface has no model: raw channels, known only by recordings.
+/// Line of n raw sensors at (i + ½)·l/n. Sensor i reads exp(−(a − x_i)²/(2·s²)) for a contact at a, plus
+/// Gaussian noise; s is the point spread.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArraySensor {
     rig: Rig,
     spread: PointSpread,
     spread_m: f64,
-    /// Position of each training press.
     presses: Vec<Position>,
 }
 
 impl ArraySensor {
-    /// An array of the length of a rig's surface, pressed at the same training positions with the same force. The noise is the
-    /// same share of the full scale as that of the rig's first sensor.
+    /// Creates an array with the length, training positions, force and relative noise of a rig.
     ///
     /// # Errors
-    /// [`RigSimulationError`] for a rig without a model or training positions.
+    /// [`RigSimulationError`] without model or training positions.
     pub fn new(rig: &Rig, count: usize, spread: PointSpread) -> Result<Self, RigSimulationError> {
         let model = rig.setup.surface().model().ok_or(SimulateError::NoModel)?;
         let force_n = rig.setup.force_n().ok_or(SimulateError::NoForce)?;
@@ -227,12 +221,12 @@ impl ArraySensor {
         Ok(Self { rig, spread, spread_m, presses })
     }
 
-    /// Bench, with the rig's training positions.
+    /// Rig with the training positions.
     pub fn rig(&self) -> &Rig {
         &self.rig
     }
 
-    /// "array, spread 10 mm", or "array, spread 0.5 pitch".
+    /// Name: "array, spread 10 mm" or "array, spread 0.5 pitch".
     pub fn name(&self) -> String {
         match self.spread {
             PointSpread::Metres(spread_m) => format!("array, spread {} mm", spread_m * 1e3),
@@ -240,7 +234,7 @@ impl ArraySensor {
         }
     }
 
-    /// Simulated calibrations, each judged by one press at each of 399 positions 1/400 of the length apart.
+    /// Simulates calibrations with test presses at 399 positions, l/400 apart.
     pub fn trials(&self, count: u64, seed: u64) -> Vec<Split> {
         let length_m = self.rig.setup.surface().extent().length_m();
         let judged: Vec<Position> =
@@ -274,35 +268,35 @@ impl ArraySensor {
     }
 }
 
-/// Parts into which half a gap between sensors is divided.
+/// Number of bins of half a gap.
 pub const FOLDS: usize = 10;
 
-/// Errors of all contacts between the outermost sensors, folded over all gaps.
+/// Errors between the outermost sensors, folded over all gaps.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FoldedErrors {
-    /// From over a sensor to half-way between two; parts without a contact are left out.
+    /// Non-empty bins from a sensor to the middle of a gap.
     pub folds: Vec<Fold>,
-    /// Mean error within a tenth of a pitch from a sensor, in metres.
+    /// Mean error within 1/10 pitch from sensors, m.
     pub at_sensors_m: f64,
-    /// Mean error within a tenth of a pitch from the middle of a gap, in metres.
+    /// Mean error within 1/10 pitch from middles of gaps, m.
     pub between_m: f64,
-    /// Share of the contacts between the outermost sensors with an error above the tolerance, in %.
+    /// Share of errors above the tolerance, %.
     pub dead_percent: f64,
 }
 
 /// Errors at one distance from the nearest sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Fold {
-    /// Middle of the part: distance from the nearest sensor over the pitch, 0 to 0.5.
+    /// Distance in pitches, 0 to 0.5.
     pub pitches: f64,
-    /// Mean error, in metres.
+    /// Mean error, m.
     pub mean_error_m: f64,
     /// Number of contacts.
     pub contacts: usize,
 }
 
 impl FoldedErrors {
-    /// Folds the errors of an evaluation over the gaps of a layout along a line.
+    /// Folds errors over the gaps of a line.
     pub fn new(evaluation: &Evaluation, layout: &Layout, tolerance_m: f64) -> Self {
         let mut places: Vec<f64> = layout.sensors().iter().map(|sensor| sensor.position.x_m).collect();
         places.sort_by(f64::total_cmp);
@@ -333,7 +327,6 @@ impl FoldedErrors {
     }
 }
 
-/// Distance of a contact from the nearest sensor, divided by the distance of the two sensors around it; `None` beyond the outermost.
 fn pitches_off(places: &[f64], located: &Located) -> Option<f64> {
     let x_m = located.truth.x_m;
     let gap = places.windows(2).find(|gap| gap[0] <= x_m && x_m <= gap[1] && gap[0] < gap[1])?;

@@ -1,8 +1,7 @@
-//! Experiments in sets: arms, each fitted from many seeds and judged at the same contact positions.
+//! Studies: sets of arms, each fitted from many seeds.
 //!
-//! There are two ways to fit an arm. Networks on perfect sensors, as in the founding paper, share one recording: the seed determines
-//! the network's random start, and many networks are trained at once, in lanes. In every other arm each seed has a recording of
-//! its own, with fresh noise. The estimator is fitted to it and judged by it.
+//! Networks on perfect sensors share one recording and train in lanes; the seed sets the random start. In
+//! other arms each seed has a recording with fresh noise.
 //!
 //! ```
 //! use palpate_numerics::watch::Watch;
@@ -50,12 +49,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! A study splits into tasks, blocks of seeds of an arm, which may run in other processes or on other machines, or into shards of
-//! them: [`PreparedStudy::tasks`], [`PreparedStudy::run_task`], [`PreparedStudy::assemble`] and [`PreparedStudy::merge`]. The results
-//! do not depend on the split.
+//! Tasks and shards run in any process: [`PreparedStudy::run_task`], [`PreparedStudy::assemble`],
+//! [`PreparedStudy::merge`]. Results do not depend on the split.
 //!
-//! Besides studies from files, three are built in: [`paper`], the founding paper's; [`dead_areas`], errors between sensors;
-//! and [`elliott`], components of a plate's readings and a network.
+//! Built-in studies: [`paper`], [`dead_areas`], [`elliott`].
 #![forbid(unsafe_code)]
 #![cfg_attr(
     not(test),

@@ -1,4 +1,4 @@
-//! Results of a study: the figures of each arm, as quantiles over the seeds.
+//! Results of a study: quantiles over the seeds.
 
 use std::f64::consts::FRAC_2_PI;
 
@@ -17,40 +17,40 @@ use palpate_mechanics::sensing::{Sensor, SensorKind};
 /// Results of a study.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StudyResults {
-    /// Every arm that has at least one fit.
+    /// Arms with at least one fit.
     pub arms: Vec<ArmResults>,
 }
 
-/// Facts of a study's run, which every file of the run contains.
+/// Facts of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunFacts {
     /// Version of palpate.
     pub palpate: String,
-    /// The study's name.
+    /// Name of the study.
     pub study: String,
-    /// SHA-256 of the study file, in hexadecimal.
+    /// SHA-256 of the study file, hexadecimal.
     pub study_sha256: String,
-    /// Seeds 0 to this less 1, of every arm.
+    /// Number of seeds per arm.
     pub seeds: u64,
-    /// Shards that were joined, where the study ran in shards.
+    /// Number of merged shards.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shards: Option<usize>,
-    /// Number of threads; for shards the largest of theirs.
+    /// Number of threads; the largest of the shards.
     pub threads: usize,
     /// Width of the numbers in training.
     pub precision: Precision,
-    /// The arithmetic of the lanes, in words.
+    /// Arithmetic of the lanes, in words.
     pub arithmetic: String,
-    /// Patterns presented to networks in this run; those of an earlier run do not count.
+    /// Patterns presented in this run.
     pub presentations: u64,
-    /// Wall-clock time of the fits, in seconds; the sum over shards.
+    /// Wall-clock time of the fits, s; the sum over shards.
     pub seconds: f64,
     /// Ratio of `presentations` to `seconds`.
     pub presentations_per_second: f64,
 }
 
 impl RunFacts {
-    /// Facts of a run of `study`, with the number of presentations and the seconds that they took.
+    /// Creates the facts of a run.
     pub fn new(
         study: &PreparedStudy,
         options: RunOptions,
@@ -73,7 +73,7 @@ impl RunFacts {
         }
     }
 
-    /// Facts of a study joined from shards, by the facts of each; `None` without a shard.
+    /// Combines the facts of shards; `None` without shards.
     pub fn of_shards(shards: &[Self]) -> Option<Self> {
         let first = shards.first()?;
         let presentations = shards.iter().fold(0u64, |sum, shard| sum.saturating_add(shard.presentations));
@@ -93,38 +93,38 @@ impl RunFacts {
     }
 }
 
-/// An arm's figures over its seeds.
+/// Results of an arm over its seeds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArmResults {
-    /// The arm.
+    /// Name of the arm.
     pub name: String,
-    /// Estimator and bench; `None` if all arms of the study have the same.
+    /// Estimator and bench; `None` if equal in all arms.
     #[serde(flatten)]
     pub set_up: Option<SetUp>,
-    /// Seeds that were fitted.
+    /// Number of fitted seeds.
     pub seeds: usize,
-    /// Number of seeds with converged training; `None` for an estimator that is not trained by epochs.
+    /// Number of converged trainings; `None` without epochs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub converged: Option<usize>,
-    /// Epochs of training; `None` for an estimator that is not trained by epochs.
+    /// Epochs of training; `None` without epochs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub epochs: Option<Quantiles>,
-    /// Average percentage error over all positions.
+    /// Average percentage error.
     pub error_percent: Quantiles,
-    /// Largest percentage error over all positions.
+    /// Largest percentage error.
     pub max_error_percent: Quantiles,
-    /// Share of the positions located within the tolerance, in %.
+    /// Share of the positions within the tolerance, %.
     pub effective_length_percent: Quantiles,
-    /// Errors by portion; in JSON as `error_percent_20_380` and so on.
+    /// Errors by portion, in JSON `error_percent_20_380`.
     #[serde(flatten, serialize_with = "portions_as_keys")]
     pub portions: Vec<PortionResults>,
-    /// Errors between the outermost training positions and beyond them, if the study requests them.
+    /// Errors inside and outside the training span, if requested.
     #[serde(flatten)]
     pub training_span: Option<TrainingSpanResults>,
-    /// The limit; `None` without noise.
+    /// Limit; `None` without noise.
     #[serde(flatten)]
     pub limit: Option<LimitResults>,
-    /// Share of the estimator's 95 % intervals that contain the contact, in %; `None` for an estimator without intervals.
+    /// Coverage of the 95 % intervals, %; `None` without intervals.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coverage_percent: Option<Quantiles>,
 }
@@ -132,11 +132,11 @@ pub struct ArmResults {
 /// Estimator and bench of an arm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SetUp {
-    /// The kind of its estimator.
+    /// Kind of the estimator.
     pub estimator: &'static str,
-    /// Force of the contacts: known or unknown to the estimator.
+    /// Known if the estimator is given the force.
     pub force: Force,
-    /// The method of its layout; `None` for a layout given by positions.
+    /// Method of the layout; `None` for given positions.
     pub layout: Option<&'static str>,
     /// Sensors.
     pub sensors: Vec<SensorPlace>,
@@ -147,42 +147,41 @@ pub struct SetUp {
 pub struct SensorPlace {
     /// Kind.
     pub measure: SensorKind,
-    /// Position along the surface, in millimetres.
+    /// Position, mm.
     pub position_mm: f64,
 }
 
 /// Errors within a portion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PortionResults {
-    /// The portion.
+    /// Portion.
     pub portion: Portion,
     /// Average percentage error.
     pub error_percent: Quantiles,
     /// Largest percentage error.
     pub max_error_percent: Quantiles,
-    /// Average percentage error of an estimator at the limit; `None` without a limit.
+    /// Average percentage error at the limit; `None` without a limit.
     pub limit_error_percent: Option<f64>,
 }
 
-/// Errors between the outermost training positions, and beyond them.
+/// Errors inside and outside the training span.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrainingSpanResults {
-    /// Portion from one outermost training position to the other.
+    /// Portion between the outermost training positions.
     pub training_span: Portion,
-    /// Average percentage error between them; `None` without a position there.
+    /// Average percentage error inside; `None` without positions.
     pub error_percent_within_training: Option<Quantiles>,
-    /// Average percentage error beyond them; `None` without a position there.
+    /// Average percentage error outside; `None` without positions.
     pub error_percent_beyond_training: Option<Quantiles>,
 }
 
-/// Cramér–Rao limit of an arm, as figures of error.
+/// Cramér–Rao limit of an arm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LimitResults {
-    /// Average percentage error of an estimator at the limit, over all positions. The contact is known to lie on the surface, also where
-    /// the readings hardly determine the position. So the limit s counts as 1/√(1/s² + 12/l²), with l the surface's length.
+    /// Average percentage error at the limit s, as 1/√(1/s² + 12/l²) on a surface of length l.
     pub limit_error_percent: f64,
-    /// Ratio of the average error to the average error at the limit; `None` without contacts that count. These are at least 1/80 of the
-    /// length from the ends, and have a limit of at most 1/200 of the length.
+    /// Ratio of average error to limit, over contacts at least l/80 from the ends with limits up to l/200;
+    /// `None` without any.
     pub error_over_limit: Option<Quantiles>,
 }
 
@@ -204,7 +203,7 @@ fn portions_as_keys<S: serde::Serializer>(
 }
 
 impl StudyResults {
-    /// Summarizes the outcomes of a run of `study`, one for each arm.
+    /// Summarizes the outcomes of a run.
     pub fn new(outcomes: &[ArmOutcome], study: &PreparedStudy) -> Self {
         let set_ups: Vec<SetUp> = study.study.arms.iter().map(SetUp::new).collect();
         // If all arms have the same, the study file states it.
@@ -219,7 +218,7 @@ impl StudyResults {
         Self { arms: outcomes.iter().filter_map(results).collect() }
     }
 
-    /// The arm with this name.
+    /// Arm of this name.
     pub fn arm(&self, name: &str) -> Option<&ArmResults> {
         self.arms.iter().find(|arm| arm.name == name)
     }
@@ -286,14 +285,12 @@ impl ArmResults {
     }
 }
 
-/// The judged positions, with the mean error of an estimator at the limit at each, in metres.
 fn allowed(arm: &Arm, judging: &Judging) -> Option<Vec<(Position, f64)>> {
     let force_n = arm.rig.setup.force_n().or(arm.rig.pressed_setup().ok()?.force_n())?;
     let errors_m = expected_errors_m(&arm.rig.setup, force_n, &judging.positions)?;
     Some(judging.positions.iter().copied().zip(errors_m).collect())
 }
 
-/// The mean over the figures within a portion, or over all.
 fn mean(figures: &[(Position, f64)], portion: Option<Portion>) -> Option<f64> {
     let inside = |at: Position| portion.is_none_or(|portion| portion.contains(at));
     let inner: Vec<f64> = figures.iter().filter(|(at, _)| inside(*at)).map(|(_, figure)| *figure).collect();
@@ -318,7 +315,6 @@ fn training_span(outcome: &ArmOutcome, arm: &Arm) -> Option<TrainingSpanResults>
     })
 }
 
-/// One figure of the errors within a portion, in % of the length.
 pub(super) fn percent(
     evaluation: &Evaluation,
     portion: Option<Portion>,
@@ -327,18 +323,15 @@ pub(super) fn percent(
     evaluation.summary(portion).map(|summary| percentage_error(pick(summary), evaluation.extent.length_m()))
 }
 
-/// Average error of the contacts at the positions that `keep` accepts, in % of the length.
+/// Average error at accepted positions, in % of the length.
 pub(super) fn average_percent(evaluation: &Evaluation, keep: impl Fn(Position) -> bool) -> Option<f64> {
     let located = evaluation.located.iter().filter(|located| keep(located.truth)).copied().collect();
     percent(&Evaluation { located, ..*evaluation }, None, |summary| summary.average_m)
 }
 
-/// Mean error, in metres, of an estimator at the limit at each of `positions`, for contacts of `force_n` newtons; `None` for a
-/// bench without a limit.
+/// Returns the expected errors at the limit, m.
 ///
-/// Where readings hardly determine the position, the limit is unbounded, but the contact is known to lie on the surface. So
-/// the bound's standard deviation s is combined with a flat prior of variance l²/12, as in the scores of a sensor design:
-/// √(2/π) / √(1/s² + 12/l²), with l the surface's length. For small s, this is the mean error of the bound itself.
+/// The bound s is combined with a flat prior of variance l²/12: √(2/π) / √(1/s² + 12/l²).
 fn expected_errors_m(setup: &Setup, force_n: f64, positions: &[Position]) -> Option<Vec<f64>> {
     let limit = setup.cramer_rao_bound().ok()?;
     let force = setup.force();

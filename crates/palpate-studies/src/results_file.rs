@@ -1,11 +1,11 @@
-//! The file `results.json`, as every run of a study writes it.
+//! The file `results.json`.
 
 use serde::Serialize;
 
 use super::paper::{Claim, PublishedFigure};
 use super::results::{RunFacts, StudyResults};
 
-/// Content of `results.json`: results and the facts of their run; for the founding paper's study also a comparison with the paper.
+/// Content of `results.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct ResultsFile<'a> {
     /// Facts of the run.
@@ -14,10 +14,10 @@ pub struct ResultsFile<'a> {
     /// Results.
     #[serde(flatten)]
     pub results: &'a StudyResults,
-    /// The paper's figures beside those of the run.
+    /// Published figures (paper study only).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub published: Option<Vec<PublishedFigure>>,
-    /// The paper's claims.
+    /// Claims (paper study only).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub claims: Option<Vec<Claim>>,
 }

@@ -1,4 +1,4 @@
-//! Preparation and run of a study: its layouts, its recordings, and the fits of every arm's seeds, in lanes and threads.
+//! Preparation and run of a study: layouts, recordings and fits.
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -24,72 +24,69 @@ use super::task::Task;
 /// Error of running a study.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StudyRunError {
-    /// The layout of an arm cannot be designed.
+    /// Failed layout design.
     #[error("arm `{arm}`: {error}")]
     Design {
-        /// The arm.
+        /// Arm.
         arm: String,
-        /// The bytes of the study file that state the method.
+        /// Bytes of the method in the study file.
         span: Range<usize>,
-        /// The problem.
+        /// Problem.
         error: Box<DesignError>,
     },
-    /// An arm's bench cannot be simulated.
+    /// Failed simulation.
     #[error("arm `{arm}`: {error}")]
     Simulate {
-        /// The arm.
+        /// Arm.
         arm: String,
-        /// The problem.
+        /// Problem.
         error: RigSimulationError,
     },
-    /// An arm's estimator cannot be fitted, or evaluated.
+    /// Failed fit or evaluation.
     #[error("arm `{arm}`: {error}")]
     Fit {
-        /// The arm.
+        /// Arm.
         arm: String,
-        /// The problem.
+        /// Problem.
         error: EvaluationError<FitError>,
     },
-    /// A task of an arm that the study does not have.
+    /// Unknown arm.
     #[error("the study has no arm `{arm}`; it has {}", .known.join(", "))]
     NoArm {
-        /// The arm.
+        /// Arm.
         arm: String,
-        /// The study's arms.
+        /// Arms of the study.
         known: Vec<String>,
     },
-    /// The run was stopped; finished fits have been reported.
+    /// Cancelled after some fits.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
 
-/// A study that is ready to be run.
+/// Study ready to run.
 #[derive(Clone, Debug)]
 pub struct PreparedStudy {
-    /// The study, with the layouts that methods determined.
+    /// Study with its designed layouts.
     pub study: Study,
     arms: Vec<PreparedArm>,
 }
 
-/// Method of fitting an arm.
 #[derive(Clone, Debug)]
 enum PreparedArm {
-    /// Networks on perfect sensors: one recording for all seeds, and one for judging.
+    /// Networks on perfect sensors: shared recording and evaluation.
     InLanes(Box<InLanes>),
-    /// Any other arm: a calibration that is simulated anew for each seed.
+    /// Other arms: a new calibration for each seed.
     SeedBySeed {
         calibration: Box<Calibration>,
-        /// Contacts by which every seed is judged, one for each reading.
+        /// Contacts by reading.
         contacts: Vec<Contact>,
-        /// Patterns of an epoch; 0 for an estimator that is not trained by epochs.
+        /// Patterns of an epoch; 0 without epochs.
         patterns: usize,
     },
 }
 
-/// An arm of networks on perfect sensors.
 #[derive(Clone, Debug)]
 struct InLanes {
-    /// Estimator of the arm: networks.
     estimator: Estimator,
     setup: Setup,
     trial: Split,
@@ -102,10 +99,10 @@ impl InLanes {
 }
 
 impl PreparedStudy {
-    /// Determines the layouts by method, and simulates the recordings that all seeds of an arm share.
+    /// Designs the layouts and simulates the shared recordings.
     ///
     /// # Errors
-    /// [`StudyRunError`] with the name of the arm, or when `watch` stopped the search for layouts.
+    /// [`StudyRunError`] with the arm, or if cancelled.
     pub fn new(study: Study, watch: Watch) -> Result<Self, StudyRunError> {
         let study = lay_out(study, watch)?;
         let arms = study.arms.iter().map(|arm| PreparedArm::new(arm, &study));
@@ -113,18 +110,18 @@ impl PreparedStudy {
         Ok(Self { study, arms })
     }
 
-    /// Whether an arm's fits are networks, which are restored from the weights in `networks.csv`; for other fits `evaluations.csv` keeps the
-    /// located positions.
+    /// True for networks, restored from weights in `networks.csv`; `evaluations.csv` keeps the positions of
+    /// other fits.
     pub fn keeps_weights(&self, arm: usize) -> bool {
         matches!(self.study.arms[arm].rig.estimator, Estimator::Network(_))
     }
 
-    /// Whether an arm's networks are trained in lanes.
+    /// True if an arm's networks train in lanes.
     pub fn is_in_lanes(&self, arm: usize) -> bool {
         matches!(self.arms[arm], PreparedArm::InLanes(_))
     }
 
-    /// Patterns in an epoch of an arm; 0 for an estimator that is not trained by epochs.
+    /// Patterns of an epoch; 0 without epochs.
     pub fn patterns(&self, arm: usize) -> usize {
         match &self.arms[arm] {
             PreparedArm::InLanes(arm) => arm.trial.training.rows.len(),
@@ -132,22 +129,21 @@ impl PreparedStudy {
         }
     }
 
-    /// Patterns that were presented to a fit's network; 0 for an estimator that is not trained by epochs.
+    /// Patterns presented in a fit; 0 without epochs.
     pub fn presentations(&self, Trained { arm, fit }: &Trained) -> u64 {
         fit.training.map_or(0, |training| u64::from(training.epochs) * self.patterns(*arm) as u64)
     }
 
-    /// Judges a network that was trained in lanes; `None` for an arm that is not trained in lanes, or for other channels.
     fn judge(&self, arm: usize, seed: u64, locator: Locator) -> Option<Trained> {
         let PreparedArm::InLanes(prepared) = &self.arms[arm] else { return None };
         let evaluation = Evaluation::new(&locator, &prepared.trial.judged).ok()?;
         Some(Trained { arm, fit: Calibrated { seed, locator, evaluation }.into() })
     }
 
-    /// The index of the arm with this name in the study.
+    /// Index of an arm.
     ///
     /// # Errors
-    /// [`StudyRunError::NoArm`], with the names of all arms.
+    /// [`StudyRunError::NoArm`] with the known names.
     pub fn arm(&self, name: &str) -> Result<usize, StudyRunError> {
         self.study.arms.iter().position(|arm| arm.name == name).ok_or_else(|| StudyRunError::NoArm {
             arm: name.to_owned(),
@@ -155,7 +151,7 @@ impl PreparedStudy {
         })
     }
 
-    /// Contacts by which every seed of an arm is judged, one for each reading; empty for an arm trained in lanes.
+    /// Contacts by reading; empty for an arm in lanes.
     pub(crate) fn contacts(&self, arm: usize) -> &[Contact] {
         match &self.arms[arm] {
             PreparedArm::InLanes(_) => &[],
@@ -163,8 +159,7 @@ impl PreparedStudy {
         }
     }
 
-    /// Restores a network of this study from its weights and outcome, and judges it; `None` for a wrong number of weights, or for an arm
-    /// with another estimator.
+    /// Restores and judges a network; `None` for unsuitable weights or estimators.
     pub fn restore(
         &self,
         arm: usize,
@@ -192,7 +187,7 @@ impl PreparedStudy {
         }
     }
 
-    /// Positions and tolerance by which the study judges.
+    /// Positions and tolerance of the evaluation.
     pub fn judging(&self) -> &Judging {
         &self.study.judging
     }
@@ -227,10 +222,10 @@ impl PreparedArm {
     }
 }
 
-/// Seed of the searches for layouts. A layout is part of its arm, so it does not depend on the study's seeds.
+/// A layout is part of its arm and independent of the study's seeds.
 const LAYOUT_SEED: u64 = 0;
 
-/// Gives every arm with a layout by method the result of the study's `[design]`; arms with equal requests get the same.
+/// Designs all layouts; equal requests share one result.
 fn lay_out(mut study: Study, watch: Watch) -> Result<Study, StudyRunError> {
     let mut found: Vec<(LayoutRequest, Layout)> = Vec::new();
     for arm in &mut study.arms {
@@ -257,7 +252,6 @@ fn lay_out(mut study: Study, watch: Watch) -> Result<Study, StudyRunError> {
     Ok(study)
 }
 
-/// Inputs that determine a layout.
 #[derive(PartialEq)]
 struct LayoutRequest {
     method: DesignMethod,
@@ -280,16 +274,16 @@ fn request(arm: &Arm) -> Option<(AskedLayout, LayoutRequest)> {
     Some((asked, LayoutRequest { method, setup, design }))
 }
 
-/// One fitted seed of an arm, as results and files need it.
+/// One fitted seed of an arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainedSeed {
-    /// The seed.
+    /// Seed.
     pub seed: u64,
-    /// Outcome of its training; `None` for an estimator that is not trained by epochs.
+    /// Outcome of training; `None` without epochs.
     pub training: Option<TrainingOutcome>,
-    /// Weights of a network; empty for another estimator.
+    /// Weights of a network; else empty.
     pub weights: Vec<f64>,
-    /// The located contacts.
+    /// Located contacts.
     pub evaluation: Evaluation,
 }
 
@@ -304,26 +298,26 @@ impl From<Calibrated<Method>> for TrainedSeed {
     }
 }
 
-/// A fitted seed with the index of its arm in the study.
+/// Fitted seed with its arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trained {
     /// Index of the arm.
     pub arm: usize,
-    /// The fit.
+    /// Fit.
     pub fit: TrainedSeed,
 }
 
-/// All fitted seeds of an arm, by seed.
+/// All fitted seeds of an arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArmOutcome {
-    /// The arm's name.
+    /// Name of the arm.
     pub name: String,
-    /// The fits, by rising seed.
+    /// Fits by rising seed.
     pub fits: Vec<TrainedSeed>,
 }
 
 impl ArmOutcome {
-    /// Quantiles over the seeds of a figure of each contact, by x in metres; for each seed, the mean over all readings at a position.
+    /// Quantiles over the seeds of the mean figure at each x, m.
     pub fn by_position(&self, figure: impl Fn(&Located) -> f64) -> Vec<(f64, Quantiles)> {
         let means = |fit: &TrainedSeed| -> Vec<(f64, f64)> {
             let positions = fit.evaluation.located.chunk_by(|a, b| a.truth == b.truth);
@@ -339,32 +333,31 @@ impl ArmOutcome {
     }
 }
 
-/// Options of a study's run.
+/// Options of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct RunOptions {
-    /// Seeds 0 to this less 1.
+    /// Number of seeds.
     pub seeds: u64,
-    /// Threads that fit; at least 1.
+    /// Number of threads; at least 1.
     pub threads: usize,
 }
 
-/// Callback for every fitted seed; several threads may call it at once.
+/// Callback for fitted seeds; several threads call it at once.
 pub type OnTrained<'a> = dyn Fn(&Trained) + Sync + 'a;
 
 impl PreparedStudy {
-    /// Number of networks that train side by side; a block of seeds that is a multiple of this number fills the lanes.
+    /// Number of parallel networks; blocks should be multiples.
     pub fn lanes(&self) -> u64 {
         self.study.precision.lanes() as u64
     }
 
-    /// The tasks of `seeds` seeds of every arm, costliest arms first, in blocks of `block` seeds, at least 1.
+    /// Lists the tasks in blocks of `block` seeds, costliest arms first.
     pub fn tasks(&self, seeds: u64, block: u64) -> Vec<Task> {
         let arms = self.arms_by_cost().into_iter();
         arms.flat_map(|arm| Task::blocks(&self.study.arms[arm].name, seeds, block)).collect()
     }
 
-    /// The unfinished tasks of `seeds` seeds of every arm, without the fits in `done`: in the order of [`PreparedStudy::tasks`], blocks
-    /// of at most `block` successive seeds.
+    /// Lists the unfinished tasks in the order of [`PreparedStudy::tasks`], in blocks of successive seeds.
     pub fn tasks_left(&self, seeds: u64, block: u64, done: &[Trained]) -> Vec<Task> {
         let done: HashSet<(usize, u64)> = done.iter().map(|t| (t.arm, t.fit.seed)).collect();
         let mut left: Vec<Task> = Vec::new();
@@ -382,12 +375,10 @@ impl PreparedStudy {
         left
     }
 
-    /// Fits every seed of every arm except those in `done`, and returns all of them. The fit of a seed depends neither on the number of
-    /// threads nor on earlier fits.
+    /// Fits all seeds except those in `done` and returns all fits, independent of threads.
     ///
     /// # Errors
-    /// [`StudyRunError`] when an estimator cannot be fitted to its arm's readings, or when `watch` stopped the run. `on_trained` has
-    /// received the finished fits by then.
+    /// [`StudyRunError`] if a fit fails or if cancelled; `on_trained` has received the finished fits.
     pub fn run(
         &self,
         options: RunOptions,
@@ -400,11 +391,10 @@ impl PreparedStudy {
         Ok(self.by_arm(done, options.seeds))
     }
 
-    /// Fits the seeds of some tasks except those in `done`, with `threads` threads, in no particular order. The fit of a seed depends
-    /// neither on the tasks, nor on the threads, nor on earlier fits.
+    /// Fits the seeds of tasks except those in `done`.
     ///
     /// # Errors
-    /// [`StudyRunError`] as for [`PreparedStudy::run`], and for an arm that the study does not have.
+    /// As [`PreparedStudy::run`], and for an unknown arm.
     pub fn fit_tasks(
         &self,
         tasks: &[Task],
@@ -445,7 +435,6 @@ impl PreparedStudy {
         }
     }
 
-    /// The seeds of every arm that remain to be fitted.
     fn work(&self, tasks: &[Task], done: &[Trained]) -> Result<Vec<ArmWork>, StudyRunError> {
         let mut taken: HashSet<(usize, u64)> = done.iter().map(|t| (t.arm, t.fit.seed)).collect();
         let mut seeds = vec![Vec::new(); self.arms.len()];
@@ -456,14 +445,14 @@ impl PreparedStudy {
         Ok(seeds.into_iter().map(|seeds| ArmWork { seeds, taken: AtomicU64::new(0) }).collect())
     }
 
-    /// Arms in lanes first, the costliest of them first; the seeds of other arms keep all threads busy at the end.
+    /// Costliest arms in lanes first; seeds of other arms keep all threads busy at the end.
     fn arms_by_cost(&self) -> Vec<usize> {
         let mut arms: Vec<usize> = (0..self.arms.len()).collect();
         arms.sort_by_key(|arm| std::cmp::Reverse((self.is_in_lanes(*arm), self.patterns(*arm))));
         arms
     }
 
-    /// Sorts fits into one outcome for each arm, with seeds 0 to `seeds` less 1.
+    /// Sorts fits with seeds below `seeds` into outcomes.
     pub fn by_arm(&self, finished: Vec<Trained>, seeds: u64) -> Vec<ArmOutcome> {
         let mut outcomes: Vec<ArmOutcome> = self
             .study
@@ -483,13 +472,11 @@ impl PreparedStudy {
     }
 }
 
-/// The seeds of an arm that remain to be fitted, and the number of those that threads have taken.
 struct ArmWork {
     seeds: Vec<u64>,
     taken: AtomicU64,
 }
 
-/// Source of an arm's seeds for one thread, and sink of its fits.
 struct Queue<'a> {
     study: &'a PreparedStudy,
     arm: usize,
@@ -499,7 +486,6 @@ struct Queue<'a> {
 }
 
 impl Queue<'_> {
-    /// Fits many seeds of an arm side by side.
     fn fit_in_lanes(&mut self, prepared: &InLanes, watch: Watch) -> Result<(), StudyRunError> {
         let name = &self.study.study.arms[self.arm].name;
         prepared
@@ -508,7 +494,6 @@ impl Queue<'_> {
             .map_err(|error| unfitted(name, EvaluationError::Fit(error)))
     }
 
-    /// Fits seed after seed of an arm, up to the last.
     fn fit_each(&mut self, calibration: &Calibration, watch: Watch) -> Result<(), StudyRunError> {
         let arm = &self.study.study.arms[self.arm];
         while let Some(seed) = self.next_seed() {
@@ -526,7 +511,6 @@ impl Queue<'_> {
     }
 }
 
-/// Error of an arm that cannot be fitted, or that was stopped.
 fn unfitted(arm: &str, error: EvaluationError<FitError>) -> StudyRunError {
     if Cancelled::caused(&error) {
         return Cancelled.into();

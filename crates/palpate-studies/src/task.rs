@@ -1,20 +1,19 @@
-//! Tasks of a study: blocks of seeds of one arm; and shards, which are shares of all tasks.
+//! Tasks of a study, and shards of them.
 
 use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
-/// Seeds of one arm that are fitted together: a plain value, which may be sent to another process or machine.
+/// Block of seeds of one arm.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Task {
-    /// The arm, by its name.
+    /// Name of the arm.
     pub arm: String,
-    /// The seeds.
+    /// Seeds.
     pub seeds: Range<u64>,
 }
 
-/// Greatest number of seeds of an arm.
 pub(crate) const MOST_SEEDS: u64 = 1_000_000;
 
 impl Task {
@@ -23,7 +22,6 @@ impl Task {
         self.seeds.end.saturating_sub(self.seeds.start)
     }
 
-    /// The seeds 0 to `seeds` less 1 of an arm in blocks of `block`, at least 1; the last block has the remaining seeds.
     pub(crate) fn blocks(arm: &str, seeds: u64, block: u64) -> impl Iterator<Item = Self> {
         let block = block.max(1);
         (0..seeds.div_ceil(block)).map(move |i| {
@@ -33,7 +31,7 @@ impl Task {
     }
 }
 
-/// The K-th of N shares of a study's tasks, "K/N": every N-th task from the K-th on.
+/// Shard "K/N": every N-th task from the K-th on.
 ///
 /// ```
 /// use palpate_studies::Shard;
@@ -49,24 +47,24 @@ pub struct Shard {
     of: u64,
 }
 
-/// Error of an invalid shard.
+/// Invalid shard.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ShardError {
     /// Not of the form K/N.
     #[error("{found:?} is not a shard: it must be K/N, the K-th of N shares, as in 3/16")]
     NotAShard {
-        /// The text.
+        /// Text.
         found: String,
     },
-    /// A number outside the range of the shards.
+    /// Shard number out of range.
     #[error("shard {number} of {of}: it must be from 1 to {of}")]
     Number {
-        /// The number.
+        /// Number.
         number: u64,
         /// Number of shards.
         of: u64,
     },
-    /// A number of shards that is out of range.
+    /// Number of shards out of range.
     #[error("{of} shards: there must be from 1 to {}", Shard::MOST)]
     Of {
         /// Number of shards.
@@ -75,13 +73,13 @@ pub enum ShardError {
 }
 
 impl Shard {
-    /// Greatest number of shards.
+    /// Largest number of shards.
     pub const MOST: u64 = 1_000_000;
 
-    /// The shard `number`, from 1, of `of`.
+    /// Creates the shard `number`, from 1, of `of`.
     ///
     /// # Errors
-    /// [`ShardError`], with the number and its bound.
+    /// [`ShardError`] with the number and its bound.
     pub fn new(number: u64, of: u64) -> Result<Self, ShardError> {
         if !(1..=Self::MOST).contains(&of) {
             return Err(ShardError::Of { of });
@@ -97,12 +95,12 @@ impl Shard {
         self.number
     }
 
-    /// The number of shards.
+    /// Number of shards.
     pub fn of(self) -> u64 {
         self.of
     }
 
-    /// The tasks of this shard among all tasks of a study.
+    /// Selects the tasks of this shard.
     pub fn share(self, tasks: Vec<Task>) -> Vec<Task> {
         // Neighbours are of one arm and have similar costs, so that every shard gets its share of the costly arms.
         let step = usize::try_from(self.of).unwrap_or(usize::MAX);
@@ -127,7 +125,6 @@ impl FromStr for Shard {
     }
 }
 
-/// A whole number written with digits only.
 fn whole(digits: &str) -> Option<u64> {
     digits.bytes().all(|byte| byte.is_ascii_digit()).then(|| digits.parse().ok())?
 }

@@ -1,4 +1,4 @@
-//! Figures of benchmarks, which `cargo xtask bench` saves and compares.
+//! Figures of benchmarks for `cargo xtask bench`.
 
 use std::env;
 use std::fs::OpenOptions;
@@ -6,10 +6,10 @@ use std::io::Write;
 
 use serde_json::json;
 
-/// Adds the median of a benchmark to the file that `PALPATE_FIGURES` names, as a line of JSON. Without the variable this has no effect.
+/// Appends the median of a benchmark to the file `PALPATE_FIGURES`, if set, as JSON.
 ///
 /// # Panics
-/// The file cannot be written.
+/// Panics if the file cannot be written.
 pub fn figure(name: &str, median: f64, unit: &str) {
     let Some(file) = env::var_os("PALPATE_FIGURES") else { return };
     let line = json!({"name": name, "median": median, "unit": unit});

@@ -1,8 +1,8 @@
-//! Numbers of a JSON document, to be put wrong one by one.
+//! Numbers of a JSON document, for tests with invalid values.
 
 use serde_json::Value;
 
-/// Numbers that break code without checks: zero, nearly zero, too many, too large, of the other sign.
+/// Numbers that break unchecked code.
 pub const HOSTILE: [&str; 10] = [
     "0",
     "-0.0",
@@ -16,17 +16,17 @@ pub const HOSTILE: [&str; 10] = [
     "18446744073709551615",
 ];
 
-/// A number's place in a document, as people write it: `locator.method.rows[3].x_m`.
+/// Path of a number: `locator.method.rows[3].x_m`.
 pub type Path = String;
 
-/// All numbers of a document in its order, each with its path.
+/// Lists all numbers in order, with their paths.
 pub fn numbers(document: &mut Value) -> Vec<(Path, &mut Value)> {
     let mut found = Vec::new();
     collect(document, String::new(), usize::MAX, &mut found);
     found
 }
 
-/// The numbers of a document, of every list the first, the middle and the last element only.
+/// Lists the numbers; of each list only first, middle and last element.
 pub fn some_numbers(document: &mut Value) -> Vec<(Path, &mut Value)> {
     let mut found = Vec::new();
     collect(document, String::new(), 3, &mut found);

@@ -1,4 +1,4 @@
-//! Tools of the tests and benchmarks of any crate: real recordings, and a message if they are missing; stopped work; a strip that hands press; figures.
+//! Tools of tests and benchmarks.
 #![forbid(unsafe_code)]
 
 pub mod data;

@@ -1,14 +1,14 @@
-//! Work that whoever watches it stops.
+//! Cancellation of work at every check.
 
 use palpate_numerics::watch::{Cancelled, Watch};
 use std::error::Error;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Does `work` under watches that stop it at its first look, at its second and so on, until it comes to its end: gives what it makes then, and the
-/// number of looks.
+/// Cancels `work` at its first check, second check and so on until it completes; returns result and number of
+/// checks.
 ///
 /// # Panics
-/// Work that goes on after a look that stops it, or fails for another reason.
+/// Panics if work continues after a cancellation or fails otherwise.
 pub fn stopped_at_every_look<T, E: Error + 'static>(
     mut work: impl FnMut(Watch) -> Result<T, E>,
 ) -> (T, usize) {

@@ -1,6 +1,6 @@
-//! A clamped strip of strain gauges, which simulated hands press.
+//! Clamped strip of strain gauges for simulated presses.
 
-/// Rig of a clamped strip of 300 mm with six strain gauges without noise, pressed twice with 2 N at each of ten places.
+/// Clamped strip (300 mm, six noise-free strain gauges), pressed twice with 2 N at ten places.
 pub const CLAMPED_STRIP: &str = r#"
 [surface]
 kind = "beam"
@@ -25,10 +25,10 @@ repeats = 2
 [estimator]
 kind = "influence"
 "#;
-/// Force of its presses, in newtons.
+/// Force of the presses, N.
 pub const STRIP_FORCE_N: f64 = 2.0;
 
-/// The rig of [`CLAMPED_STRIP`] with a noise in µm/m.
+/// [`CLAMPED_STRIP`] with noise, µm/m.
 pub fn clamped_strip(noise_um_per_m: f64) -> String {
     CLAMPED_STRIP.replace("count = 6", &format!("count = 6\nnoise = \"{noise_um_per_m} um/m\""))
 }

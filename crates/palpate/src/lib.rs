@@ -1,5 +1,4 @@
-//! palpate turns an elastic surface with a few sensors into a calibrated contact locator: press at known places, fit, and
-//! every later reading gives position and force of the contact, with intervals.
+//! Contact localization on an elastic surface with a few sensors: calibrate with known contacts, then locate.
 //!
 //! ```
 //! use palpate::prelude::*;
@@ -15,18 +14,18 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`prelude`] has what most programs use; the modules of the crates beneath have the rest:
+//! Common items are in [`prelude`], all items in the modules of the crates:
 //!
-//! | crate | what for | modules |
+//! | crate | purpose | modules |
 //! |---|---|---|
-//! | [`mechanics`] | surfaces, sensors, what they read, and the Cramér–Rao bound | [`contact`](mechanics::contact), [`limit`](mechanics::limit), [`sensing`](mechanics::sensing), [`surface`](mechanics::surface) with [`modal`](mechanics::surface::modal) and [`plate`](mechanics::surface::plate), [`units`](mechanics::units) |
+//! | [`mechanics`] | surfaces, sensors, Cramér–Rao bound | [`contact`](mechanics::contact), [`limit`](mechanics::limit), [`sensing`](mechanics::sensing), [`surface`](mechanics::surface) with [`modal`](mechanics::surface::modal) and [`plate`](mechanics::surface::plate), [`units`](mechanics::units) |
 //! | [`estimators`] | recordings, estimators, tracking, load profiles, evaluation | [`arrangement`](estimators::arrangement), [`batch`](estimators::batch), [`centroid`](estimators::centroid), [`closed_form`](estimators::closed_form), [`description`](estimators::description), [`digit`](estimators::digit), [`estimator`](estimators::estimator), [`evaluation`](estimators::evaluation), [`features`](estimators::features), [`fit`](estimators::fit), [`gaussian_process`](estimators::gaussian_process), [`imperfections`](estimators::imperfections), [`influence`](estimators::influence) with [`measured`](estimators::influence::measured), [`likelihood`](estimators::likelihood), [`load_profile`](estimators::load_profile), [`neighbours`](estimators::neighbours), [`network`](estimators::network), [`recording`](estimators::recording), [`setup`](estimators::setup), [`simulate`](estimators::simulate), [`status`](estimators::status), [`track_errors`](estimators::track_errors), [`tracking`](estimators::tracking) |
-//! | [`design`] | where to put the sensors and where to press | [`positions`](design::positions), [`sensors`](design::sensors) |
-//! | [`rig`] | the TOML file that describes the bench | |
+//! | [`design`] | positions of sensors and contacts | [`positions`](design::positions), [`sensors`](design::sensors) |
+//! | [`rig`] | TOML file of a bench | |
 //! | [`numerics`] | linear algebra, Gaussian-process regression, distributions | [`regression`](numerics::regression), [`simd`](numerics::simd), [`small`](numerics::small), [`watch`](numerics::watch) |
 //!
-//! Lengths are in metres, forces in newtons, moduli in pascals; functions such as [`mm`](prelude::mm) say the unit where a
-//! number is written. The examples in the folder `examples` of this crate are complete programs.
+//! Units are metres, newtons and pascals; functions such as [`mm`](prelude::mm) convert. Complete programs
+//! are in the folder `examples`.
 #![forbid(unsafe_code)]
 #![cfg_attr(
     not(test),

@@ -1,4 +1,4 @@
-//! Everything that an afternoon with palpate needs: `use palpate::prelude::*;`
+//! Common items: `use palpate::prelude::*;`
 
 pub use palpate_design::positions::{Advice, PositionDesign, PositionProblem, best_placed, next_press};
 pub use palpate_design::sensors::{ContactPrior, Designed, SensorDesign, SensorProblem, Sites};

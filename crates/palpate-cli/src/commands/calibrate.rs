@@ -1,4 +1,4 @@
-//! `palpate calibrate`: a calibration by hand, guided press by press, or by a machine.
+//! `palpate calibrate`: a calibration by hand or by a machine, guided press by press.
 
 use super::jog::{Jog, JogEnd};
 use super::operator::{self, place};
@@ -31,7 +31,6 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel, sync_channel};
 use std::time::Duration;
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Calibrate a board at a serial port
@@ -110,7 +109,6 @@ impl Arguments {
     }
 }
 
-/// A command without machines.
 #[cfg(not(feature = "gcode"))]
 impl Arguments {
     fn machine(&self) -> Option<&StageUrl> {
@@ -142,7 +140,6 @@ pub struct OperatorOptions {
 }
 
 impl OperatorOptions {
-    /// The first option that is given.
     pub fn given(&self) -> Option<&'static str> {
         match self.statements() {
             Statements { placement_sd_m: Some(_), .. } => Some("--placement"),
@@ -152,7 +149,6 @@ impl OperatorOptions {
         }
     }
 
-    /// The statements of the options.
     pub fn statements(&self) -> Statements {
         Statements {
             placement_sd_m: self.placement,
@@ -162,7 +158,6 @@ impl OperatorOptions {
     }
 }
 
-/// Longest time without a look at keys, signals and the machine.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -181,7 +176,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let stated = arguments.operator.statements();
     let known = match &stage {
         None => stated.or_known(&rig, arguments.force, in_file_m, &before),
-        // The placement of the rig is that of a person.
+        // The rig's placement error is that of a person.
         Some(_) => stated,
     };
     let depths_m = stage.as_ref().map_or_else(Vec::new, |stage| stage.depths_m.clone());
@@ -226,7 +221,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The stage of the rig, where a machine presses.
 pub fn stage(
     path: &Path,
     rig: &Rig,
@@ -255,7 +249,6 @@ pub fn stage(
     Ok(Some(stage.clone()))
 }
 
-/// Rows that the file of presses has, and the placement that it says; none of a new file.
 fn rows_before(
     arguments: &Arguments,
     rig: &Rig,
@@ -271,7 +264,7 @@ fn rows_before(
     pressed_before(&arguments.rig, rig, path, depths)
 }
 
-/// Rows that a file of presses has already, and the placement that it says; none where there is no file.
+/// Returns the rows and the placement of a presses file; no rows without a file.
 pub fn pressed_before(
     rig_path: &Path,
     rig: &Rig,
@@ -288,12 +281,10 @@ pub fn pressed_before(
     }
 }
 
-/// Comment of a file of presses.
 pub fn pressed_for(rig: &Path) -> String {
     format!("palpate {}, pressed for {}", env!("CARGO_PKG_VERSION"), rig.display())
 }
 
-/// A complaint about presses that cannot be kept.
 pub fn about_journal(rig: &Path, error: &JournalError) -> Failure {
     let complaint = match error {
         JournalError::Nuisance { .. } | JournalError::Numbered => Complaint::about(rig, error),
@@ -302,10 +293,8 @@ pub fn about_journal(rig: &Path, error: &JournalError) -> Failure {
     complaint.help(error.help()).into()
 }
 
-/// Presses that are missing from rows.
 type Replan<'a> = &'a dyn Fn(&[Row]) -> Result<Vec<Press>, Complaint>;
 
-/// The bench of a calibration, and the person at its keyboard.
 struct Bench<'a> {
     arguments: &'a Arguments,
     rig: &'a Rig,
@@ -322,7 +311,7 @@ impl Bench<'_> {
         Ok((source, inputs))
     }
 
-    /// Jogs and touch-offs by the keys; the stage gets the height that is found. False where the operator ends it.
+    /// Jogs, touches off and sets the stage's surface height. Returns false if the operator quits.
     fn set_up(&self, stage: &mut Stage) -> Result<bool, Failure> {
         let Self { arguments, rig, clock, .. } = self;
         let (Some(url), Some(keys)) = (arguments.machine(), self.keys) else {
@@ -330,7 +319,7 @@ impl Bench<'_> {
                 Complaint::new("--jog needs the keyboard, and --from - takes the readings from it");
             return Err(complaint.help("give the readings by another source").into());
         };
-        // Nothing is pressed, and no file is written.
+        // This calibration has no presses, so it writes no file.
         let journal =
             Journal::new(&rig.setup, &arguments.presses, String::new(), Vec::new(), DepthKnowledge::Unknown)
                 .map_err(|error| about_journal(&arguments.rig, &error))?;
@@ -362,7 +351,6 @@ impl Bench<'_> {
             .map_err(|error| Complaint::new(format!("--from {from}: {error}")).into())
     }
 
-    /// Asks for presses at fresh places, and says how far off the locator is there.
     fn check(
         &self,
         locator: &Locator,
@@ -397,7 +385,7 @@ impl Bench<'_> {
         operator::say_check(check.as_ref(), placement_sd_m, rig.setup.surface().extent())
     }
 
-    /// Presses of a plan, guided; those that are taken are on disk. A press can be struck out where `replan` asks for it again.
+    /// Guides the presses of a plan. With `replan`, the operator can delete and repeat a press.
     fn press_all(
         &self,
         stage: Option<Stage>,
@@ -447,7 +435,6 @@ impl Bench<'_> {
         }
         if calibration.guide().waiting() != Waiting::Nothing {
             if let Some(machine) = machine {
-                // No reading shows its finger any more.
                 machine.finish().map_err(|error| machine_ended(arguments, &calibration, &error))?;
             }
             let cause = calibration.fault().unwrap_or("the source ended before all was pressed".to_owned());
@@ -463,7 +450,6 @@ impl Bench<'_> {
     }
 }
 
-/// The machine, connected, where one presses.
 fn machine(
     arguments: &Arguments,
     stage: Option<Stage>,
@@ -475,10 +461,10 @@ fn machine(
     Ok(Some(Machine::new(thread, limit_n, clock.elapsed())))
 }
 
-/// Connects to a machine, which a signal stops at once; nothing moves yet.
+/// Connects to a machine, which a signal stops at once; it does not move yet.
 fn open_stage(url: &StageUrl, stage: Stage, clock: HostClock) -> Result<StageThread, Failure> {
     let stop = Arc::default();
-    // A machine that was stopped is lifted.
+    // A stopped machine lifts its finger.
     progress::finish_after_signal();
     progress::set_at_signal(&stop).map_err(Complaint::new)?;
     let thread = StageThread::open(url, stage, stop, clock).map_err(|error| {
@@ -496,7 +482,6 @@ fn open_stage(url: &StageUrl, stage: Stage, clock: HostClock) -> Result<StageThr
     Ok(thread)
 }
 
-/// Homes, and travels to every position at the height of travel.
 fn dry_run(arguments: &Arguments, rig: &Rig, stage: Stage, clock: HostClock) -> Result<(), Failure> {
     let Some(url) = arguments.machine() else { return Ok(()) };
     let weights = arguments.operator.statements().weights(arguments.force);
@@ -525,7 +510,6 @@ fn dry_run(arguments: &Arguments, rig: &Rig, stage: Stage, clock: HostClock) -> 
     ))
 }
 
-/// Waits for the end of a machine's move; anything that was typed stops it.
 fn wait_for(thread: &mut StageThread, keys: &Receiver<String>) -> Result<(), Failure> {
     let ended = |error: MachineError| machine_failure(&error, "");
     loop {
@@ -536,12 +520,11 @@ fn wait_for(thread: &mut StageThread, keys: &Receiver<String>) -> Result<(), Fai
             thread.stop();
             return Err(ended(MachineError::ByHand));
         }
-        // Without a keyboard the channel is closed, and does not wait.
+        // Without a keyboard the channel is closed, and receiving does not wait.
         std::thread::sleep(LOOK_EVERY / 10);
     }
 }
 
-/// Has the machine do what is next; anything that was typed stops it.
 fn step(
     machine: &mut Machine,
     key: Option<&str>,
@@ -585,7 +568,6 @@ fn cannot_go_on(arguments: &Arguments, calibration: &Calibration, error: Calibra
     }
 }
 
-/// Lines that are typed.
 fn keys() -> Receiver<String> {
     let (to, keys) = channel();
     // The thread waits for the keyboard until the process ends.
@@ -599,7 +581,6 @@ fn keys() -> Receiver<String> {
     keys
 }
 
-/// Words on the keys.
 fn help(can_strike: bool) -> &'static str {
     match can_strike {
         true => {
@@ -657,7 +638,6 @@ fn stopped(arguments: &Arguments, calibration: &Calibration) -> Failure {
     }
 }
 
-/// Words on what is kept.
 fn goes_on(arguments: &Arguments, calibration: &Calibration) -> String {
     let presses = calibration.journal().presses();
     if presses == 0 {
@@ -673,7 +653,7 @@ fn goes_on(arguments: &Arguments, calibration: &Calibration) -> String {
     }
 }
 
-/// Fits the rig's estimator to the presses on disk, and says how good it is and what more presses would gain.
+/// Fits the estimator to the presses on disk, and reports errors and the gain of more presses.
 fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(Locator, Recording), Failure> {
     if !arguments.presses.exists() {
         let words =
@@ -725,7 +705,6 @@ fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(Locator, Re
     Ok((locator, recording))
 }
 
-/// JSON of a finished calibration.
 fn result(
     arguments: &Arguments,
     locator: &Locator,

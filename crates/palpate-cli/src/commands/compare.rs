@@ -1,4 +1,4 @@
-//! `palpate compare`: every estimator on the same trials, against the limit.
+//! `palpate compare`: all estimators on equal trials, compared with the Cramér–Rao limit.
 
 use super::evaluate::ErrorFigures;
 use crate::cost::MemoryOption;
@@ -24,7 +24,6 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Compare two estimators on a recording
@@ -70,7 +69,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Kind of an estimator that does not suit the rig or the recording, and the reason.
+/// Kind of an unsuitable estimator, and the reason.
 type LeftOut = (&'static str, String);
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -133,7 +132,6 @@ fn write_report(
     folder.write_report(comparison_report(&report))
 }
 
-/// The errors of each estimator at each position.
 fn errors_table(comment: &str, comparisons: &[Comparison], extent: Extent) -> CsvTable {
     let columns = [vec!["estimator"], tables::position_columns(extent), ERROR_COLUMNS.to_vec()].concat();
     let mut table = CsvTable::new(comment, columns);
@@ -148,7 +146,6 @@ fn errors_table(comment: &str, comparisons: &[Comparison], extent: Extent) -> Cs
     table
 }
 
-/// The errors of each estimator in each trial: a fold, or a simulated calibration.
 fn trials_table(comment: &str, comparisons: &[Comparison], trials: &[Split]) -> CsvTable {
     let columns = [vec!["estimator", "trial"], ERROR_COLUMNS.to_vec()].concat();
     let mut table = CsvTable::new(comment, columns);
@@ -156,7 +153,7 @@ fn trials_table(comment: &str, comparisons: &[Comparison], trials: &[Split]) -> 
         let Evaluation { extent, located } = &tried.evaluation;
         let mut rest = located.as_slice();
         for (number, trial) in trials.iter().enumerate() {
-            // The answers of all trials follow one another.
+            // The answers of all trials are concatenated.
             let count = trial.judged.rows.iter().filter(|row| row.touches()).count();
             let (own, others) = rest.split_at(count.min(rest.len()));
             rest = others;
@@ -168,10 +165,8 @@ fn trials_table(comment: &str, comparisons: &[Comparison], trials: &[Split]) -> 
     table
 }
 
-/// Splits that the estimators are compared on, the name of their data, and a description of its use.
 struct Trials {
     data: String,
-    /// The data with their digests, and their use.
     source: String,
     how: String,
     trials: Vec<Split>,
@@ -303,7 +298,6 @@ fn table(rig: &Rig, comparisons: &[Comparison], arguments: &Arguments) -> String
         .to_string()
 }
 
-/// A short time with three digits.
 fn time(seconds: f64) -> String {
     let (value, unit) = match seconds {
         s if s < 1e-6 => (s * 1e9, "ns"),

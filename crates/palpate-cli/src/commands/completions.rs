@@ -4,7 +4,6 @@ use crate::failure::Failure;
 use crate::output;
 use clap_complete::Shell;
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Complete in the current bash
@@ -21,7 +20,6 @@ pub struct Arguments {
     shell: Shell,
 }
 
-/// Prints the script for the whole command.
 pub fn run(arguments: &Arguments, mut command: clap::Command) -> Result<(), Failure> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut command, "palpate", &mut script);

@@ -24,7 +24,6 @@ use palpate_report::{EvaluationReport, Judged, evaluation_report};
 use palpate_rig::Rig;
 use std::path::PathBuf;
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Evaluate a locator with recorded contacts, and write a report
@@ -69,7 +68,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Errors over the whole surface or a portion.
 #[derive(serde::Serialize)]
 struct PortionErrors {
     portion: String,
@@ -78,7 +76,6 @@ struct PortionErrors {
     error_percent: ErrorFigures,
 }
 
-/// Figures of location errors, in one unit.
 #[derive(serde::Serialize)]
 pub struct ErrorFigures {
     pub mean: f64,
@@ -89,7 +86,6 @@ pub struct ErrorFigures {
 }
 
 impl ErrorFigures {
-    /// The figures in the unit into which `unit` converts metres.
     pub fn new(summary: &ErrorSummary, unit: impl Fn(f64) -> f64) -> Self {
         Self {
             mean: unit(summary.average_m),
@@ -101,7 +97,6 @@ impl ErrorFigures {
     }
 }
 
-/// Answers and their source.
 struct Answers {
     evaluation: Evaluation,
     recording: Provenance,
@@ -159,7 +154,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     })
 }
 
-/// The errors of each position.
 fn errors_table(arguments: &Arguments, answers: &Answers) -> CsvTable {
     let how = match &answers.subject {
         RigOrLocator::Locator(_) => "located".to_owned(),
@@ -176,7 +170,6 @@ fn errors_table(arguments: &Arguments, answers: &Answers) -> CsvTable {
     table
 }
 
-/// A rig: its estimator is fitted in each fold, and evaluated at the held-out positions.
 fn cross_validated(arguments: &Arguments, mut rig: Box<Rig>) -> Result<Answers, Failure> {
     let recording = match arguments.files.read(&rig.setup)? {
         Some(recording) => recording,
@@ -206,7 +199,6 @@ fn cross_validated(arguments: &Arguments, mut rig: Box<Rig>) -> Result<Answers, 
     Ok(Answers { evaluation, recording: recording.provenance, subject: RigOrLocator::Rig(rig) })
 }
 
-/// A locator, evaluated with a recording or with a simulation of its own bench.
 fn located(arguments: &Arguments, locator: Box<Locator>) -> Result<Answers, Failure> {
     let recording = match arguments.files.read(&locator.setup)? {
         Some(recording) => {
@@ -235,7 +227,6 @@ fn simulation_complaint(error: impl std::fmt::Display) -> Complaint {
     Complaint::new(error).help("--data names a recording to evaluate on")
 }
 
-/// Contacts all over the bench after its calibration, simulated.
 fn simulated(locator: &Locator, seed: u64) -> Result<Recording, Failure> {
     let calibration = &locator.provenance.recording;
     Observer::of_stages()
@@ -251,7 +242,7 @@ fn warn_of_training_data(locator: &Locator, recording: &Recording) {
     }
 }
 
-/// `60 mm..300 mm`, with or without spaces around the dots, or `60..300 mm`.
+/// Parses `60 mm..300 mm` or `60..300 mm`.
 fn portion(text: &str) -> Result<Portion, String> {
     const EXAMPLE: &str = "write it as in `0 mm..100 mm` or `0..100 mm`";
     let (from, to) = text.split_once("..").ok_or_else(|| format!("`{text}` has no `..`; {EXAMPLE}"))?;

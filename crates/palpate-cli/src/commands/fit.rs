@@ -1,4 +1,4 @@
-//! `palpate fit`: calibrate an estimator.
+//! `palpate fit`: calibration of an estimator.
 
 use super::learnt;
 use crate::cost::MemoryOption;
@@ -21,7 +21,6 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Fit to a recording of presses
@@ -119,7 +118,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     lines.iter().try_for_each(|line| output::say(format!("  {line}")))
 }
 
-/// Estimated cost of the fit, including a choice within the time limit.
 fn cost(rig: &Rig, recording: &Recording, arguments: &Arguments) -> FitCost {
     let cost = rig.estimator.fit_cost(&rig.setup, recording);
     let task = FitTask::new(&rig.setup, recording);
@@ -134,7 +132,6 @@ fn cost(rig: &Rig, recording: &Recording, arguments: &Arguments) -> FitCost {
     FitCost { seconds: choice + slowest.with_interval_check(recording).seconds, ..slowest }
 }
 
-/// Chooses the rig's estimator by the errors at held-out positions, and prints the figures.
 fn decide(rig: &Rig, recording: &Recording, arguments: &Arguments) -> Result<Option<Choice>, Failure> {
     let task = FitTask::new(&rig.setup, recording).seed(arguments.seed);
     let start = Instant::now();
@@ -171,7 +168,7 @@ fn decide(rig: &Rig, recording: &Recording, arguments: &Arguments) -> Result<Opt
     Ok(Some(choice))
 }
 
-/// The candidates, the chosen one first; `None` if the rig names its estimator.
+/// The chosen candidate is first; `None` if the rig names its estimator.
 fn choice_json(tried: &[Tried]) -> Option<Vec<impl Serialize>> {
     let one = |tried: &Tried| {
         object! {

@@ -11,7 +11,6 @@ use palpate_estimators::recording::{Decimal, Separator};
 use palpate_rig::{FirstRig, FirstRigError, Hints, Rig};
 use std::path::PathBuf;
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Write a rig with recordings into the current folder, and print the next commands
@@ -91,7 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         FirstRig::guess(&name, &bytes, &arguments.hints()).map_err(|error| complaint(&error, &name))?;
     let rig_name = arguments.out.as_ref().map_or("RIG.toml".to_owned(), |out| out.display().to_string());
     let text = first.to_toml(&rig_name);
-    // Read as in every later command, so that its warnings about file and channels appear now.
+    // Parsed as in every later command, so that warnings about file and channels appear now.
     let rig = Rig::from_toml(&text).map_err(Complaint::new)?;
     let recording = rig.setup.read_recording(&name, bytes.as_slice());
     let recording = recording.map_err(|error| input::csv_complaint(&error))?;
@@ -119,7 +118,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    /// The rig's file, which must not exist unless it is to be overwritten.
     fn target(&self) -> Result<Option<Target>, Failure> {
         let Some(out) = &self.out else { return Ok(None) };
         let target = Target::new(out, &Inputs::new([self.recording.as_path()]))?;

@@ -1,4 +1,4 @@
-//! `palpate inspect`: the contents of any palpate file, in words.
+//! `palpate inspect`: a description of any palpate file.
 
 use super::learnt;
 use crate::failure::Failure;
@@ -8,7 +8,6 @@ use palpate_estimators::description;
 use palpate_rig::table_in_words;
 use std::path::{Path, PathBuf};
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Describe a locator
@@ -58,7 +57,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     })
 }
 
-/// Description of a CSV file: with a rig as a recording of it, otherwise as a table.
 fn csv(path: &Path, bytes: &[u8], rig: Option<&Path>) -> Result<Vec<String>, Failure> {
     let Some(rig) = rig else { return table(path, bytes) };
     let setup = input::read_rig(rig)?.setup;

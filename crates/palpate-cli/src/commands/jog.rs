@@ -12,24 +12,18 @@ use std::time::Duration;
 
 const KEYS: &str = "keys, each with Enter: x+ x- y+ y- z+ z- move by a step, of fine (0.1 mm), normal (1 mm) or coarse (10 mm); t finds the height of the touch; b begins the presses; q ends here; Enter alone stops the machine at once";
 
-/// Longest interval between two checks of keys, signals and the machine.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 const FINE_M: f64 = 1e-4;
 const NORMAL_M: f64 = 1e-3;
 const COARSE_M: f64 = 1e-2;
 
-/// Reason for the end of the jogs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JogEnd {
-    /// The presses are to begin.
     Begin,
-    /// The operator ends the calibration.
     Quit,
-    /// A signal ends the jogs.
     Interrupted,
 }
 
-/// Outcome of the jogs.
 #[derive(Clone, Copy, Debug)]
 pub struct JogOutcome {
     pub end: JogEnd,
@@ -37,7 +31,6 @@ pub struct JogOutcome {
     pub touch_z_m: Option<f64>,
 }
 
-/// Meaning of a typed line.
 #[derive(Clone, Debug, PartialEq)]
 enum Key {
     Task(SetUpTask),
@@ -47,13 +40,11 @@ enum Key {
     Unknown,
 }
 
-/// A machine that is moved with keys.
 pub struct Jog {
     machine: Machine,
     calibration: Calibration,
     clock: HostClock,
     step_m: f64,
-    /// Lines that are deferred until the machine rests.
     lines: VecDeque<String>,
     end: JogEnd,
     touch_z_m: Option<f64>,
@@ -65,7 +56,7 @@ impl Jog {
         Self { machine, calibration, clock, step_m: NORMAL_M, lines, end, touch_z_m: None }
     }
 
-    /// Executes typed lines until the operator ends the jogs; then the finger is lifted.
+    /// Executes typed lines until the operator ends the jogs, then lifts the finger.
     ///
     /// # Errors
     /// [`MachineError`] if the machine was stopped.
@@ -107,7 +98,7 @@ impl Jog {
         Ok(JogOutcome { end: self.end, touch_z_m: self.touch_z_m })
     }
 
-    /// Takes typed lines: a stop at once, all others when the machine rests.
+    /// Executes a stop at once, and defers other lines until the machine rests.
     fn take_keys(&mut self, keys: &Receiver<String>) -> Result<(), MachineError> {
         loop {
             match keys.try_recv() {

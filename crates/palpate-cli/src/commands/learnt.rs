@@ -1,4 +1,4 @@
-//! Structure, drift, scatter and noise that a locator of a surface without a model has learnt, as JSON.
+//! JSON of the structure, drift, scatter and noise in a locator of a surface without a model.
 
 use crate::json::object;
 use palpate_estimators::estimator::Locator;
@@ -6,12 +6,10 @@ use palpate_estimators::influence::ForceLinearLocator;
 use palpate_mechanics::contact::Position;
 use serde::Serialize;
 
-/// The locator of a force-linear surface, and the names of its channels; `None` for any other.
 pub fn of_locator(locator: &Locator) -> Option<(&ForceLinearLocator, Vec<String>)> {
     Some((locator.force_linear()?, locator.setup.layout().names()))
 }
 
-/// All learnt properties, as JSON: in the units of the channels.
 pub fn json(linear: &ForceLinearLocator, names: &[String]) -> impl Serialize + use<> {
     let size_of = |sizes: &[(usize, f64)], c: usize| sizes.iter().find(|(of, _)| *of == c).map(|(_, sd)| *sd);
     let (drifts, scatter) = (linear.drifts(), linear.scatter());

@@ -1,4 +1,4 @@
-//! `palpate limit`: what physics allows on a bench, position by position, and the lightest touch that is told from noise.
+//! `palpate limit`: Cramér–Rao bound and smallest detectable force of a bench, by position.
 
 use crate::cost::MemoryOption;
 use crate::failure::{Complaint, Failure};
@@ -25,7 +25,6 @@ use palpate_report::{LimitReport, limit_report};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Compute the limit of a rig at a spacing of 50 mm
@@ -66,7 +65,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// The limit for both kinds of knowledge of the force.
 struct Limits<'a> {
     limit: &'a CramerRaoBound<'a>,
     force_n: f64,
@@ -76,7 +74,7 @@ struct Limits<'a> {
     listed: Vec<Position>,
     warnings: Vec<LimitWarning>,
     touch: &'a LightestTouch<'a>,
-    /// The lightest touch over the surface.
+    /// Smallest detectable force over the surface, for both detection probabilities.
     touches: [Option<TouchSummary>; 2],
 }
 
@@ -122,7 +120,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// Announces the limit of many sensors, and refuses one that takes more memory than it may.
 fn check_cost(setup: &Setup, listed: usize, arguments: &Arguments) -> Result<(), Failure> {
     let Some(surface) = setup.surface().model() else { return Ok(()) };
     let cost = CramerRaoBound::cost(surface, setup.layout(), listed);
@@ -130,7 +127,6 @@ fn check_cost(setup: &Setup, listed: usize, arguments: &Arguments) -> Result<(),
     arguments.memory.check_work(&what, cost.seconds, cost.memory_bytes, "take fewer sensors or `elements`")
 }
 
-/// The influence functions that a locator of a surface without a model has learnt.
 fn learnt(bench: &RigOrLocator) -> Option<&ForceLinearLocator> {
     match bench {
         RigOrLocator::Locator(locator) => locator.force_linear(),
@@ -146,7 +142,6 @@ fn false_alarm_rate(bench: &RigOrLocator) -> FalseAlarmRate {
     set.unwrap_or_default()
 }
 
-/// The bench, with the noise of the command line, or that which a locator has learnt.
 fn setup(bench: &RigOrLocator, arguments: &Arguments) -> Result<Setup, Failure> {
     let mut setup = match bench {
         RigOrLocator::Rig(rig) => rig.setup.clone(),
@@ -221,8 +216,7 @@ fn limits<'a>(
     })
 }
 
-/// Positions from one end to the other: for the paper's beam 1, 20, 50, 100, 200 mm and mirrored; on a plane rows of them from one
-/// side to the other.
+/// A few symmetric positions, such as 1, 20, 50, 100, 200 mm and mirrored for the paper's beam.
 fn a_few(extent: Extent) -> Vec<Position> {
     const ON_A_LINE: [f64; 9] = [0.0025, 0.05, 0.125, 0.25, 0.5, 0.75, 0.875, 0.95, 0.9975];
     const ON_A_PLANE: [f64; 7] = [0.05, 0.125, 0.25, 0.5, 0.75, 0.875, 0.95];
@@ -265,7 +259,7 @@ fn write_report(
     limit_table(limits, arguments).write(folder, "limit.csv")
 }
 
-/// The limit and the lightest touch all over the surface. What the readings do not tell is an empty cell.
+/// Cells of unidentifiable contacts are empty.
 fn limit_table(limits: &Limits, arguments: &Arguments) -> CsvTable {
     let extent = limits.known.extent;
     let comment = format!(
@@ -292,9 +286,9 @@ fn limit_table(limits: &Limits, arguments: &Arguments) -> CsvTable {
     table
 }
 
-/// JSON of the limit. A limit that is not there, because the readings do not tell, is null.
+/// Limits of unidentifiable contacts are null.
 fn json(limits: &Limits, setup: &Setup, arguments: &Arguments) -> impl Serialize {
-    // Limits over the surface; `mean_error_mm` is what an estimator at the limit is off on average.
+    // Limits over the surface; `mean_error_mm` is the mean error of an estimator at the limit.
     let summary = |summary: LimitSummary| {
         object! {
             "mean_mm": summary.mean_m * 1e3,
@@ -319,7 +313,7 @@ fn json(limits: &Limits, setup: &Setup, arguments: &Arguments) -> impl Serialize
             "lightest_touch_n": limits.touch.forces_at(position),
         }
     };
-    // Forces that a locator without knowledge of the force finds with so much probability.
+    // Forces that are detected with this probability if the force is unknown.
     let touch = |summary: &TouchSummary| {
         object! {
             "found_percent": summary.found * 100.0,
@@ -350,7 +344,7 @@ fn json(limits: &Limits, setup: &Setup, arguments: &Arguments) -> impl Serialize
         "sensors": setup.layout().len(),
         "sensors_alive": limits.limit.alive(),
         "force_n": limits.force_n,
-        // What the rig knows of it: what the warnings are about.
+        // Knowledge of the force in the rig, which the warnings assume.
         "force": limits.force,
         "known_force": limits.known.summary().map(summary),
         "unknown_force": limits.unknown.summary().map(summary),
@@ -397,8 +391,6 @@ fn print_line(limits: &Limits, extent: Extent) -> Result<(), Failure> {
     output::say(summary_rows(limits).into_iter().fold(table, Table::row))
 }
 
-/// A row of numbers a row of positions, the uppermost first, and a table for each knowledge of the force; where that would
-/// be too wide, a line a position.
 fn print_plane(limits: &Limits) -> Result<(), Failure> {
     const MOST_COLUMNS: usize = 12;
     let mut rows: Vec<&[Position]> = limits.listed.chunk_by(|a, b| a.y_m == b.y_m).collect();
@@ -427,7 +419,6 @@ fn print_plane(limits: &Limits) -> Result<(), Failure> {
     output::say(summary_rows(limits).into_iter().fold(table, Table::row))
 }
 
-/// A limit in millimetres, or that the readings do not tell it.
 fn limit_figure(bound: Option<&Bound>) -> String {
     told(bound.map(|bound| bound.sd_position_m * 1e3))
 }
@@ -436,7 +427,6 @@ fn told(value: Option<f64>) -> String {
     value.map_or_else(|| "unidentifiable".to_owned(), |value| figure(Some(value)))
 }
 
-/// Positions left out of the limits over the surface, as the readings do not tell them, in a line for each knowledge of the force.
 fn not_told_in_words(limits: &Limits) -> String {
     let line = |(curve, name): (&LimitCurve, &str)| {
         let words = curve.not_told_in_words()?;
@@ -447,13 +437,11 @@ fn not_told_in_words(limits: &Limits) -> String {
     [(&limits.known, "known"), (&limits.unknown, "unknown")].into_iter().filter_map(line).collect()
 }
 
-/// A force with three digits; a dash for none.
 fn force_figure(force_n: Option<f64>) -> String {
     let three = |force_n: f64| -> f64 { format!("{force_n:.2e}").parse().unwrap_or(force_n) };
     force_n.map_or_else(|| "–".to_owned(), |force_n| three(force_n).to_string())
 }
 
-/// The lightest touch over the surface, in words.
 fn lightest_touch_in_words(limits: &Limits) -> String {
     let extent = limits.known.extent;
     let rate = limits.touch.rate();
@@ -476,7 +464,7 @@ fn lightest_touch_in_words(limits: &Limits) -> String {
     )
 }
 
-/// Rows of the limit over the whole surface, whatever positions are listed.
+/// Rows of the limit over the whole surface.
 fn summary_rows(limits: &Limits) -> Vec<Vec<String>> {
     let summaries = [limits.known.summary(), limits.unknown.summary()];
     let row = |name: &str, of: fn(&LimitSummary) -> f64| {

@@ -1,4 +1,4 @@
-//! `palpate locate`: readings in, estimates out, line by line.
+//! `palpate locate`: an estimate for each line of readings.
 
 use crate::estimate_columns::{EstimateColumns, Guesses};
 use crate::failure::{Complaint, Failure};
@@ -14,7 +14,6 @@ use serde::Serialize;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Locate the readings of a file
@@ -55,7 +54,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut locator = input::read_locator(&arguments.locator)?;
     for channel in &arguments.disable {
-        // Channel 0 is none, like those beyond the last.
+        // An invalid channel, like those beyond the last.
         let left_out = locator.leave_out(channel.wrapping_sub(1));
         left_out.map_err(|error| Complaint::new(format!("--disable {channel}: {error}")))?;
     }
@@ -95,7 +94,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             Some(estimate) => columns.row(vec![line.to_string()], &EstimateRecord::new(estimate, extent)),
         };
         output::print(&mut out, text.as_bytes())?;
-        // A reader at the other end of a pipe wants each estimate now.
+        // The reader of a pipe gets each estimate at once.
         output::flush(&mut out)?;
     }
     if readings.awaits_columns() && readings.lines.is_whole() {
@@ -108,7 +107,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     readings.lines.finish("estimate")
 }
 
-/// The estimate of a reading; `None` of one that is taken for an untouched one.
+/// Returns `None` for a reading of the baseline.
 fn locate(
     locator: &Locator,
     taring: Option<&mut Taring>,
@@ -122,21 +121,19 @@ fn locate(
     }
 }
 
-/// The status of a reading that is taken for an untouched one, and is not located.
+/// Status of a baseline reading, which is not located.
 const TARE: &str = "tare";
 
 fn untouched_json(line: u64) -> Result<String, Failure> {
     json_line(&object! { "line": line, "status": TARE })
 }
 
-/// A line of JSON: all that the locator says of the reading in line `line` of its source, and the shape where it is asked for.
 fn json(
     estimate: &Estimate,
     line: u64,
     extent: Extent,
     shape: Option<&DigitShape>,
 ) -> Result<String, Failure> {
-    /// The record of an estimate, with its line and shape.
     #[derive(Serialize)]
     struct Line<S> {
         line: u64,
@@ -153,7 +150,7 @@ fn json_line(object: &impl Serialize) -> Result<String, Failure> {
     serde_json::to_string(object).map(|line| line + "\n").map_err(|error| Complaint::new(error).into())
 }
 
-/// A point of the bent finger's centre line: how far along it, where, and how sure.
+/// Returns a point of the finger's centre line: arc length, position and standard deviations.
 fn shape_point(point: &ShapePoint) -> impl Serialize {
     object! {
         "at_mm": point.at_m * 1e3,

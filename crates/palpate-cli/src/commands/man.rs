@@ -5,7 +5,6 @@ use crate::output;
 use crate::target::{Inputs, TargetFolder};
 use std::path::PathBuf;
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Write the pages for `man`
@@ -20,15 +19,13 @@ pub struct Arguments {
     out: PathBuf,
 }
 
-/// A manual page: its file's name and content.
 struct ManualPage {
     name: String,
     bytes: Vec<u8>,
 }
 
-/// Writes the pages of the whole command.
 pub fn run(arguments: &Arguments, mut command: clap::Command) -> Result<(), Failure> {
-    // Without it, each group of verbs has a page for its verb `help`.
+    // Otherwise each group of verbs has a page for its verb `help`.
     command = command.disable_help_subcommand(true);
     command.build();
     let mut pages = Vec::new();
@@ -40,7 +37,6 @@ pub fn run(arguments: &Arguments, mut command: clap::Command) -> Result<(), Fail
     output::say(format!("{} manual pages: {}", pages.len(), arguments.out.display()))
 }
 
-/// Adds the page of a verb, and those of the verbs under it.
 fn add_pages(command: &clap::Command, pages: &mut Vec<ManualPage>) -> std::io::Result<()> {
     let name = format!("{}.1", command.get_display_name().unwrap_or(command.get_name()));
     let mut bytes = Vec::new();

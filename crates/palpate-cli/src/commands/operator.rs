@@ -1,4 +1,4 @@
-//! Questions to the person who presses in `palpate calibrate`, and displays of the presses and of a check.
+//! Questions to the operator of `palpate calibrate`, and displays of presses and checks.
 
 use crate::failure::Failure;
 use crate::json::object;
@@ -18,7 +18,7 @@ use std::io::IsTerminal;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
-/// Asks for missing statements, if a person is at the terminal.
+/// Asks an operator at the terminal for missing statements.
 pub fn ask(
     known: Statements,
     rig: &Rig,
@@ -52,14 +52,13 @@ pub fn ask(
     Ok(stated)
 }
 
-/// Warning about a calibration with one weight.
 pub fn single_weight(force_n: f64) -> String {
     format!(
         "all presses have {force_n} N, and the force in use is unknown: one weight does not determine how readings grow with the force"
     )
 }
 
-/// True if a person at the terminal requests a check.
+/// Returns true if an operator at the terminal requests a check.
 pub fn wants_check(keys: &Receiver<String>) -> bool {
     if !std::io::stdin().is_terminal() {
         return false;
@@ -73,7 +72,7 @@ pub fn wants_check(keys: &Receiver<String>) -> bool {
     matches!(answer(keys, parse), Ok(Some(())))
 }
 
-/// The next line that can be parsed; `None` for an empty one, and at the end of the input.
+/// Returns the next valid line; `None` for an empty one or at the end.
 fn answer<T>(
     keys: &Receiver<String>,
     parse: impl Fn(&str) -> Result<Option<T>, String>,
@@ -95,7 +94,6 @@ fn answer<T>(
     }
 }
 
-/// Lists the presses with the deviation of each from the others of its place.
 pub fn list(rows: &[Row], extent: Extent) {
     let touched = rows.iter().enumerate().filter(|(_, row)| row.touches());
     if touched.clone().next().is_none() {
@@ -111,7 +109,6 @@ pub fn list(rows: &[Row], extent: Extent) {
     }
 }
 
-/// Prints the errors of the locator at the places of a check.
 pub fn say_check(check: Option<&Check>, placement_sd_m: Option<f64>, extent: Extent) -> Result<(), Failure> {
     let Some(check) = check else {
         alert!("no place was checked");
@@ -140,7 +137,6 @@ pub fn say_check(check: Option<&Check>, placement_sd_m: Option<f64>, extent: Ext
     output::say(format!("error at fresh places: median {median}, mean {mean}{covered}{placement}"))
 }
 
-/// JSON of a check.
 pub fn check_json(check: &Check) -> impl Serialize + use<> {
     let places = check.places.iter().map(|checked| {
         object! {
@@ -160,7 +156,7 @@ pub fn check_json(check: &Check) -> impl Serialize + use<> {
     }
 }
 
-/// Prints the events, and the next action of a person who presses on a surface of the extent `hand`.
+/// Prints the events and the operator's next action; `hand` is the extent of the surface.
 pub fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
     for note in notes {
         match note {
@@ -191,7 +187,6 @@ pub fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
     }
 }
 
-/// Asks for what the guide needs next.
 pub fn ask_for(calibration: &Calibration, extent: Extent) {
     let guide = calibration.guide();
     match (guide.waiting(), guide.next_press()) {
@@ -205,7 +200,6 @@ pub fn ask_for(calibration: &Calibration, extent: Extent) {
     }
 }
 
-/// A press in words.
 pub fn place(press: Press, extent: Extent) -> String {
     let mm = |at_m: f64| format_length_mm(at_m);
     let place = match extent {

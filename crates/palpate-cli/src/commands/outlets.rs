@@ -1,4 +1,4 @@
-//! Outputs of a session that `record` and `serve` share: ROS 2 and Foxglove.
+//! Outputs of `record` and `serve`: ROS 2 and Foxglove.
 
 use crate::failure::{Complaint, Failure};
 use palpate_live::sink::OpenSink;
@@ -17,7 +17,6 @@ pub struct Outlets {
 }
 
 impl Outlets {
-    /// Sinks for every session.
     pub fn open(&self) -> Result<Vec<OpenSink>, Failure> {
         let mut sinks = Vec::new();
         if let Some(url) = &self.ros {

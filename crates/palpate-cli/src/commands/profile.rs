@@ -1,4 +1,4 @@
-//! `palpate profile`: how force is spread over the surface, reading by reading.
+//! `palpate profile`: the load profile of each reading.
 
 use crate::failure::{Complaint, Failure};
 use crate::input::RigOrLocator;
@@ -16,7 +16,6 @@ use palpate_mechanics::surface::{Extent, UniformLoad};
 use palpate_report::{ProfileReport, profile_report};
 use std::path::{Path, PathBuf};
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Estimate the load of the first readings of a file
@@ -91,9 +90,7 @@ struct Printer<'a> {
     subject: &'a RigOrLocator,
     profiler: &'a Profiler<'a>,
     report: Option<&'a TargetFolder>,
-    /// The loads that were simulated.
     truth: &'a [UniformLoad],
-    /// Readings that gave a profile.
     told: u64,
 }
 
@@ -134,7 +131,7 @@ impl Printer<'_> {
         readings.lines.finish("profile")
     }
 
-    /// Prints the profile of a reading, and writes the report about the first.
+    /// Prints the profile of a reading; the first one also gets a report.
     fn tell(&mut self, reading: &[f64], line: Option<u64>) -> Result<(), Failure> {
         let profile = self.profiler.profile(reading).map_err(Complaint::new)?;
         let extent = self.profiler.cells().extent;
@@ -182,7 +179,6 @@ impl Printer<'_> {
     }
 }
 
-/// Prints a profile for people.
 fn print(told: &JsonProfile) -> Result<(), Failure> {
     let interval = |value: &Interval, unit: &str| {
         format!("{:.3} {unit} ({})", value.value, ends(value.low, value.high, ""))
@@ -225,7 +221,6 @@ fn print(told: &JsonProfile) -> Result<(), Failure> {
     output::say(format!("\n{}", JsonPatch::columns(&told.loads, "true load", told.extent, number)))
 }
 
-/// The ends of an interval in words.
 fn ends(low: f64, high: f64, unit: &str) -> String {
     match high.is_finite() {
         true => format!("{low:.3} to {high:.3}{unit}"),
@@ -233,10 +228,10 @@ fn ends(low: f64, high: f64, unit: &str) -> String {
     }
 }
 
-/// Load profile of a reading as JSON; what the reading does not tell is null.
+/// Load profile of a reading; unidentifiable values are null.
 #[derive(serde::Serialize)]
 struct JsonProfile {
-    /// The line of the reading; null for a simulated one.
+    /// Line of the reading; null for a simulated one.
     line: Option<u64>,
     status: &'static str,
     misfit: f64,
@@ -249,16 +244,15 @@ struct JsonProfile {
     /// Median width of the averaging kernels.
     resolution_mm: Option<f64>,
     patches: Vec<JsonPatch<Interval>>,
-    /// The loads that were simulated.
     loads: Vec<JsonPatch<f64>>,
     profile: Vec<JsonCell>,
-    /// Residual of each channel over its noise; null for dead ones.
+    /// Residual of each channel over its noise; null for disabled channels.
     residuals: Vec<Option<f64>>,
     #[serde(skip)]
     extent: Extent,
 }
 
-/// The ends of the total force's 95 % interval if no load lies within a distance of an edge.
+/// 95 % interval of the total force if no load lies within `margin_mm` of an edge.
 #[derive(Clone, Copy, serde::Serialize)]
 struct Seen {
     margin_mm: f64,
@@ -266,7 +260,7 @@ struct Seen {
     high_n: f64,
 }
 
-/// A value, its standard deviation and the ends of its 95 % interval; null where the reading does not bound it.
+/// A value, its standard deviation and its 95 % interval; null where it is unbounded.
 #[derive(serde::Serialize)]
 struct Interval {
     value: f64,
@@ -275,21 +269,20 @@ struct Interval {
     high: f64,
 }
 
-/// A patch of the profile, or with plain numbers a load that was simulated.
+/// A patch of the profile; with plain numbers, a simulated load.
 #[derive(serde::Serialize)]
 struct JsonPatch<T> {
     stretch_mm: [f64; 2],
     centre_x_mm: T,
-    /// Coordinates across the width, on a plane only.
+    /// Coordinates across the width of a plane.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     across: Option<Across<T>>,
     force_n: T,
-    /// Least standard deviations for evenly loaded patches of this number and these sizes.
+    /// Least standard deviations for evenly loaded patches of this number and size.
     limit_x_mm: Option<f64>,
     limit_force_n: Option<f64>,
 }
 
-/// A patch or a load across the width of a plane.
 #[derive(serde::Serialize)]
 struct Across<T> {
     stretch_y_mm: [f64; 2],
@@ -297,7 +290,7 @@ struct Across<T> {
     limit_y_mm: Option<f64>,
 }
 
-/// A cell of the surface with its density, in N/mm on a line and N/mm² on a plane.
+/// Density in N/mm on a line and N/mm² on a plane.
 #[derive(serde::Serialize)]
 struct JsonCell {
     x_mm: f64,

@@ -23,7 +23,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Record a simulated board for two seconds
@@ -65,11 +64,10 @@ pub struct Arguments {
     outlets: Outlets,
 }
 
-/// Interval between two checks for a signal.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    // Complains about an unusable path; the recorder itself makes the file, and overwrites no other.
+    // Rejects an unusable path; the recorder itself creates the file, and overwrites no other.
     Target::new(&arguments.out, &Inputs::new([arguments.locator.as_path()]))?;
     if arguments.json && stdout::was_closed() {
         return Err(output::closed());
@@ -141,7 +139,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     finish(arguments, &status, &session.counters(), fault, unprinted)
 }
 
-/// Reports what was recorded; a `fault` of the feed is a failure.
+/// A `fault` of the feed is a failure.
 fn finish(
     arguments: &Arguments,
     status: &RecordingStatus,
@@ -166,7 +164,7 @@ fn finish(
     if !faults.is_empty() {
         return Err(Failure::DataLost(format!("{summary}; {}", faults.join("; "))));
     }
-    // A reader that has closed the pipe needs no more; the recording is complete without it.
+    // A reader that closes the pipe needs no more output; the recording is complete.
     if let Some(error) = unprinted.filter(|error| error.kind() != std::io::ErrorKind::BrokenPipe) {
         alert!("{summary}");
         return Err(output::unprinted(error));
@@ -181,11 +179,10 @@ fn finish(
     output::say(summary)
 }
 
-/// Ends a session at a signal, or after a time.
+/// Ends a session with [`Input::Stop`] at a signal, or after a time in seconds.
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// Sends [`Input::Stop`] at a signal, or after this many seconds.
     pub fn after(seconds: Option<f64>, to: SyncSender<Input>) -> Result<Self, Failure> {
         let done = Arc::new(AtomicBool::new(false));
         let watched = Arc::clone(&done);
@@ -211,7 +208,6 @@ impl Drop for Stop {
     }
 }
 
-/// Writes problems of the source, and of the outputs beside the session, to stderr.
 pub struct Words;
 
 impl Sink for Words {

@@ -9,7 +9,6 @@ use palpate_live::recording;
 use palpate_mechanics::units::format_count;
 use std::path::PathBuf;
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Repair a recording

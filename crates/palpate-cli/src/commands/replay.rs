@@ -19,7 +19,6 @@ use serde_json::{Map, Value};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Locate the readings again and compare
@@ -50,7 +49,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// An estimate of a recorded reading.
 #[derive(Serialize)]
 struct Line {
     number: u64,
@@ -88,7 +86,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     by_another(arguments, session, playback, printer)
 }
 
-/// Locates the readings again with the recorded settings, and reports whether every estimate is the same.
+/// Repeats the recorded estimates and reports whether they are identical.
 fn by_the_same(
     arguments: &Arguments,
     locator: &Locator,
@@ -104,7 +102,7 @@ fn by_the_same(
     let mut reading = Vec::new();
     while let Some(recorded) = playback.next_recorded().map_err(Complaint::new)? {
         if let Recorded::Reading { values, .. } = recorded {
-            // As the board's number times its unit: equal to the reading to the last bit.
+            // The board's number times its unit, bitwise equal to the reading.
             reading =
                 values.iter().zip(&units).map(|(value, channel)| value * channel.unit.factor()).collect();
             continue;
@@ -138,7 +136,6 @@ fn by_the_same(
     Ok(())
 }
 
-/// Processes the raw readings in another session.
 fn by_another(
     arguments: &Arguments,
     mut session: Session,
@@ -174,7 +171,7 @@ fn by_another(
     check_losses(arguments, &playback, count, "reading")
 }
 
-/// Fails if parts of the recording could not be read, or if it contains no `record`; reports messages of other programs.
+/// Fails if parts are unreadable or no `record` exists; reports other programs' messages.
 fn check_losses(arguments: &Arguments, playback: &Playback, count: u64, record: &str) -> Result<(), Failure> {
     let passed_over = playback.passed_over();
     if passed_over.foreign > 0 {
@@ -210,7 +207,6 @@ fn is_the_same(estimate: &EstimateRecord, before: &Map<String, Value>) -> bool {
     serde_json::to_value(estimate).is_ok_and(|now| now.as_object() == Some(before))
 }
 
-/// Destination and format of printed estimates.
 struct Printer<'a, W> {
     out: &'a mut W,
     /// Columns of the CSV; `None` for JSON.

@@ -1,7 +1,8 @@
-//! `palpate init --example`: a rig with data and the next commands, for users without a clone of the project.
+//! `palpate init --example`: a rig with data and the next commands.
 //!
-//! `samples` holds copies of files of the project's `examples`, because a package of this crate contains its own files only; `cargo xtask
-//! tidy` compares them. Benches with a model have data of the simulation, with fixed seeds.
+//! `samples` holds copies of files of the project's `examples`, as a package contains its own files
+//! only; `cargo xtask tidy` compares them. Benches with a model have simulated data with fixed
+//! seeds.
 
 use super::simulate::simulated_csv;
 use crate::failure::{Complaint, Failure};
@@ -28,17 +29,13 @@ pub enum SampleBench {
     Finger,
 }
 
-/// Where and how a bench is written.
 pub struct Request<'a> {
     pub bench: SampleBench,
     pub folder: &'a Path,
-    /// True if existing files are replaced.
     pub overwrite: bool,
-    /// True for JSON instead of text on stdout.
     pub json: bool,
 }
 
-/// Content of the files of a bench.
 struct Files {
     rig: String,
     presses: Vec<u8>,
@@ -59,7 +56,6 @@ impl SampleBench {
         }
     }
 
-    /// Files of the bench, which will be called `rig_name` and `presses_name`.
     fn files(self, rig_name: &str, presses_name: &str) -> Result<Files, Failure> {
         let modelled = |rig: &str, spacing_m: f64| {
             let path = Path::new(rig_name);
@@ -88,7 +84,6 @@ impl SampleBench {
         }
     }
 
-    /// Commands that use the files.
     fn next_commands(self, paths: &Paths) -> Vec<String> {
         let [rig, presses, touches, locator] = paths.words();
         // The offsets of a bench without a model drift.
@@ -99,7 +94,7 @@ impl SampleBench {
             format!("palpate evaluate {locator} --data {touches}{tare}"),
         ];
         if self.has_model() {
-            // The force of the finger's presses is not that of its contacts.
+            // The finger's presses and contacts have different forces.
             let force = if self == Self::Finger { " --force \"4 N\"" } else { "" };
             commands.push(format!("palpate limit {rig}{force}"));
             commands.push(format!(
@@ -115,12 +110,10 @@ impl SampleBench {
     }
 }
 
-/// Paths of the files of a bench.
 struct Paths {
     rig: PathBuf,
     presses: PathBuf,
     touches: PathBuf,
-    /// The locator that the next commands write.
     locator: PathBuf,
 }
 
@@ -134,14 +127,13 @@ impl Paths {
         }
     }
 
-    /// Rig, presses, touches and locator as words of a shell.
+    /// Paths quoted for a shell.
     fn words(&self) -> [String; 4] {
         [&self.rig, &self.presses, &self.touches, &self.locator]
             .map(|path| shell_word(&path.display().to_string()))
     }
 }
 
-/// Writes the files of a bench, and prints the next commands.
 pub fn run(request: &Request) -> Result<(), Failure> {
     let Request { bench, folder, overwrite, json } = *request;
     let paths = Paths::new(bench, folder);

@@ -28,14 +28,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The bench of the demonstration: the founding paper's, with noise.
+/// Bench of the demonstration: the founding paper's, with noise.
 const DEMO: &str = include_str!("../../samples/noisy-beam.toml");
-/// The name of the demonstration's file.
 const DEMO_NAME: &str = "examples/noisy-beam.toml";
-/// Interval between two checks for Ctrl-C.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Serve a simulated board, and open http://127.0.0.1:8377
@@ -112,7 +109,6 @@ impl Arguments {
         self.stage.as_ref()
     }
 
-    /// A command without machines.
     #[cfg(not(feature = "gcode"))]
     fn machine(&self) -> Option<&StageUrl> {
         None
@@ -165,7 +161,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     while !progress::interrupted() {
         std::thread::sleep(LOOK_EVERY);
     }
-    // The session ends first, so that browsers get its last messages; both end within milliseconds.
+    // The session ends first, so that browsers get its last messages.
     let fault = live.end();
     drop(server);
     if let Some(fault) = fault {
@@ -174,9 +170,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     Err(Failure::Interrupted("the server was ended".to_owned()))
 }
 
-/// Refuses a path for recordings that is not a folder, and one that cannot be made; the first recording makes the folder.
+/// Rejects a path that is not a folder or cannot be created; the first recording creates it.
 fn check_folder(folder: &Path) -> Result<(), Failure> {
-    // The last ancestor of a relative path is the working folder of the command; its path is empty.
+    // The last ancestor of a relative path is empty: the working folder.
     let is_there = |path: &&Path| path.as_os_str().is_empty() || path.symlink_metadata().is_ok();
     match folder.ancestors().find(is_there) {
         Some(found) if !found.as_os_str().is_empty() && !found.is_dir() => {
@@ -188,7 +184,7 @@ fn check_folder(folder: &Path) -> Result<(), Failure> {
     }
 }
 
-/// A board without a rig: in browsers, its readings are shown, a rig is made, and it is calibrated.
+/// Serves a board without a rig, which browsers make and calibrate.
 fn bringing_up(from: &SourceUrl, arguments: &Arguments) -> Result<Live, Failure> {
     if let Some(path) = &arguments.rules {
         let complaint = Complaint::new(format!("--rules {}: rules need a locator", path.display()));
@@ -199,7 +195,6 @@ fn bringing_up(from: &SourceUrl, arguments: &Arguments) -> Result<Live, Failure>
     Ok(configured(live, arguments))
 }
 
-/// The locator of the arguments, without a session.
 fn live(arguments: &Arguments) -> Result<Live, Failure> {
     let path = arguments.locator.as_deref().unwrap_or(Path::new(DEMO_NAME));
     let read = match &arguments.locator {
@@ -239,12 +234,11 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
     }
     // A locator that does not fit the options is refused before the server starts.
     arguments.session.session(&locator, path)?;
-    // Paths in URLs are relative to the working folder of the command, as in its arguments.
+    // Paths in URLs are relative to the working folder, as in the arguments.
     let live = with_rules(Live::new(locator, &name, simulated, PathBuf::new()), rules, alarms);
     Ok(configured(live, arguments))
 }
 
-/// The rules of the arguments: commands to the board, and alarms.
 fn rules_of(arguments: &Arguments, extent: Extent) -> Result<RulesByAction, Failure> {
     let rules = rules::read(arguments.rules.as_deref(), extent)?.by_action();
     if let Some(path) = &arguments.rules {
@@ -261,15 +255,13 @@ fn with_rules(live: Live, rules: RulesByAction, alarms: Option<KeptAlarms>) -> L
     }
 }
 
-/// Alarms from an earlier run of the server, and their file.
 struct KeptAlarms {
     file: AlarmFile,
     text: String,
     rules: Rules,
 }
 
-/// The stored alarms, beside the locator or else in the folder of recordings; `None` if alarms come from --rules, or if they have
-/// no file.
+/// Alarms beside the locator or in the folder of recordings; `None` with --rules or without a file.
 fn kept_alarms(
     arguments: &Arguments,
     rules: &RulesByAction,
@@ -291,7 +283,6 @@ fn kept_alarms(
     Ok(Some(KeptAlarms { file, text, rules }))
 }
 
-/// Adds the recordings and sessions of the arguments.
 fn configured(live: Live, arguments: &Arguments) -> Live {
     let live = live.with_sessions(arguments.session.config());
     match &arguments.record {
@@ -300,7 +291,6 @@ fn configured(live: Live, arguments: &Arguments) -> Live {
     }
 }
 
-/// The calibration of the arguments, if browsers calibrate.
 fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure> {
     let Arguments {
         calibrate: true,
@@ -326,7 +316,7 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
     Target::new(out, &inputs)?;
     Target::new(presses, &inputs)?;
     let rig = input::read_rig(path)?;
-    // A calibration that is impossible is refused here, where the place in the file can be shown.
+    // An impossible calibration is refused here, where its place in the file is known.
     let stage = stage(path, &rig, arguments.machine(), arguments.force)?;
     let depths = DepthKnowledge::for_stage(stage.as_ref());
     let (before, in_file_m) = pressed_before(path, &rig, presses, depths)?;
@@ -334,7 +324,7 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
     let stated = arguments.operator.statements();
     let statements = match &stage {
         None => stated.or_known(&rig, arguments.force, in_file_m, &before),
-        // The placement in the rig is for a person.
+        // The rig's placement error is that of a person.
         Some(_) => stated,
     };
     plan(&rig, statements.weights(arguments.force), depths_m, &before)
@@ -386,7 +376,6 @@ fn fitted(rig: &Rig, path: &Path, arguments: &Arguments) -> Result<Locator, Fail
         .map_err(|error| Failure::from_error(&error))
 }
 
-/// Starts the first session, if its source is known.
 fn begin(live: &Live, arguments: &Arguments) -> Result<(), Failure> {
     let begun = match (&arguments.from, &arguments.locator) {
         (Some(url), _) => live.begin(url),
@@ -409,7 +398,7 @@ fn refused(error: AccessError) -> Failure {
     Complaint::new(error).help(help).into()
 }
 
-/// 128 bits from the system's random numbers, in hexadecimal digits.
+/// Returns 128 random bits in hexadecimal digits.
 fn made_up_token() -> Result<String, Failure> {
     let mut bytes = [0; 16];
     getrandom::fill(&mut bytes).map_err(|error| {

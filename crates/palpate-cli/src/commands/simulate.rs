@@ -15,7 +15,6 @@ use palpate_rig::{Rig, RigSimulationError};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Simulate the calibration of a rig
@@ -71,7 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     ))
 }
 
-/// A recording of a rig from the file at `path`, and its CSV: at the training positions, or at a spacing in metres.
+/// Simulates the training positions, or positions at a spacing in metres.
 pub fn simulated_csv(
     rig: &Rig,
     path: &Path,
@@ -129,7 +128,6 @@ fn move_contact(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(), Fa
     output::say(told)
 }
 
-/// JSON of a recording that was written: the time that it takes, and the beam that swings, of a moving contact.
 fn result(
     arguments: &Arguments,
     recording: &Recording,
@@ -149,7 +147,6 @@ fn result(
     }
 }
 
-/// Comment at the head of a recording: its origin.
 fn comment(rig: &Path, seed: u64) -> String {
     format!("palpate {}, simulated from {}, seed {seed}", env!("CARGO_PKG_VERSION"), rig.display())
 }

@@ -16,7 +16,6 @@ use palpate_rig::Rig;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Print the frames of a board for one second
@@ -134,7 +133,6 @@ fn ppm(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Longest sleep between checks for lines and signals.
 const LOOK_EVERY: Duration = Duration::from_millis(5);
 /// Time for which the cable is disconnected.
 const AWAY: Duration = Duration::from_secs(1);
@@ -177,12 +175,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     .run(arguments)
 }
 
-/// Default time constants of a creep and of a residue, in seconds, if only the share is given.
+/// Default time constants of creep and hysteresis, in seconds, if only the share is given.
 const CREEP_S: f64 = 5.0;
 const RESIDUE_S: f64 = 20.0;
 
 impl Arguments {
-    /// Faults of the board: the imperfections of the rig, overridden by options.
     fn faults(&self, rig: &Rig) -> FaultConfig {
         let faults = FaultConfig::of_setup(&rig.setup);
         let Imperfections { hysteresis, creep, residue, drift, repeated_readings, .. } = faults.imperfections;
@@ -208,7 +205,6 @@ impl Arguments {
     }
 }
 
-/// A relaxation of the rig, overridden by options.
 fn relaxation(of_rig: Relaxation, share: Option<f64>, time_s: Option<f64>, usual_s: f64) -> Relaxation {
     let rig_s = if of_rig.share > 0.0 { of_rig.time_s } else { usual_s };
     Relaxation { share: share.unwrap_or(of_rig.share), time_s: time_s.unwrap_or(rig_s) }
@@ -226,7 +222,6 @@ fn load_cell(arguments: &Arguments, rig: &Rig) -> Result<Option<LoadCell>, Failu
 }
 
 #[cfg(feature = "gcode")]
-/// The machine of the rig, at its own link.
 fn machine(arguments: &Arguments, rig: &Rig) -> Result<Option<PluggedMachine>, Failure> {
     let Some(url) = &arguments.stage else { return Ok(None) };
     if !matches!(url, LinkUrl::Pty(_) | LinkUrl::Tcp(_)) {
@@ -251,7 +246,6 @@ fn machine(arguments: &Arguments, rig: &Rig) -> Result<Option<PluggedMachine>, F
 }
 
 #[cfg(feature = "gcode")]
-/// A machine at its link.
 struct PluggedMachine {
     machine: SimulatedMachine,
     link: Link,
@@ -261,7 +255,6 @@ struct PluggedMachine {
 
 #[cfg(feature = "gcode")]
 impl PluggedMachine {
-    /// Answers the requests of the other end, at a time since the start.
     fn work(&mut self, now: Duration) -> std::io::Result<()> {
         self.machine.advance_to(now);
         let Some(bytes) = self.link.bytes()? else {
@@ -285,14 +278,12 @@ impl PluggedMachine {
     }
 }
 
-/// A board at its link.
 struct Plugged<'a> {
     board: SimulatedBoard<'a>,
     link: Link,
     #[cfg(feature = "gcode")]
     machine: Option<PluggedMachine>,
     away_until: Option<Duration>,
-    /// Number of commands from the other end.
     commands: u64,
 }
 

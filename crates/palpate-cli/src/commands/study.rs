@@ -24,7 +24,6 @@ mod shards;
 
 use fits::{FitFiles, Tally};
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Replicate the founding paper with 2 fits of each arm instead of 100
@@ -68,7 +67,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Treatment of an earlier run in the same folder.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum EarlierRun {
     Leave,
@@ -85,7 +83,7 @@ impl Arguments {
         }
     }
 
-    /// The folder for results and report of a study. It may contain an earlier run only if the command line states how to treat it.
+    /// Folder of the study; an earlier run in it needs `--resume` or `--overwrite`.
     fn folder(&self, study: &str) -> Result<TargetFolder, Failure> {
         let whole = || Path::new("palpate-out").join(study);
         let out = self.out.clone().unwrap_or_else(|| match self.shard {
@@ -120,11 +118,9 @@ impl Arguments {
     }
 }
 
-/// A requested study.
 struct Asked<'a> {
     arguments: &'a Arguments,
     is_paper: bool,
-    /// Name of the file, and its text.
     name: String,
     text: String,
 }
@@ -169,7 +165,6 @@ impl Asked<'_> {
         prepared.map_err(|error| complaint(&error, &self.name, &self.text))
     }
 
-    /// Writes report and results of a whole study, and prints them.
     fn finish(
         &self,
         prepared: &PreparedStudy,
@@ -195,7 +190,6 @@ impl Asked<'_> {
     }
 }
 
-/// Complaint about a study, with a caret at the setting that is impossible.
 fn complaint(error: &StudyRunError, name: &str, text: &str) -> Failure {
     let complaint = Complaint::new(error);
     match error {
@@ -211,8 +205,7 @@ fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Fits the tasks that an earlier run has not finished, and updates the tables; at the end they are sorted, with a row for every
-/// fit. Returns all fits, and the facts of this run's fits.
+/// Fits the remaining tasks and returns all fits; the tables are sorted at the end.
 fn train(
     prepared: &PreparedStudy,
     options: RunOptions,
@@ -288,7 +281,7 @@ fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
     output::say_report("", Some(out))
 }
 
-/// "40 s on 2 threads, 12.3 M presentations/s (AVX2, 8 lanes)", on a line of its own.
+/// Formats "40 s on 2 threads, 12.3 M presentations/s (AVX2, 8 lanes)".
 fn time_in_words(run: &RunFacts) -> String {
     let seconds = progress::duration(run.seconds);
     let threads = match run.shards {
@@ -308,7 +301,7 @@ fn yes_or_no(holds: bool) -> String {
     if holds { "yes" } else { "NO" }.to_owned()
 }
 
-/// Table of the arms; columns that are empty for all arms are omitted.
+/// Columns that are empty for all arms are omitted.
 fn arms_table(arms: &[ArmResults]) -> String {
     let mut table = Table::from_rows(arms);
     for (heading, of) in arm_columns(arms) {
@@ -319,7 +312,6 @@ fn arms_table(arms: &[ArmResults]) -> String {
     table.to_string()
 }
 
-/// A heading, and the cell of an arm under it.
 type ArmColumn = (String, Box<dyn Fn(&ArmResults) -> Option<String>>);
 
 fn arm_columns(arms: &[ArmResults]) -> Vec<ArmColumn> {
@@ -358,18 +350,17 @@ fn arm_columns(arms: &[ArmResults]) -> Vec<ArmColumn> {
     columns
 }
 
-/// "2.38 (2.26–2.73)": the median, and the 5th and the 95th percentile.
+/// Formats median, 5th and 95th percentile as "2.38 (2.26–2.73)".
 fn in_words(spread: Quantiles, shown: impl Fn(f64) -> String) -> String {
     let [median, low, high] = [spread.median, spread.p05, spread.p95].map(shown);
     format!("{median} ({low}–{high})")
 }
 
-/// A count, or a percentile of counts, rounded.
 fn whole(count: f64) -> String {
     format_count(count.round() as u64)
 }
 
-/// A claim, shortened to a line of a table.
+/// Shortens a claim to a line of a table.
 fn short(claim: &str) -> String {
     const MOST: usize = 90;
     if claim.chars().count() <= MOST {

@@ -23,7 +23,6 @@ use serde_json::json;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Track a contact in a file of readings, ten per second
@@ -139,12 +138,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    /// True if stdout gets text lines.
     fn prints_text(&self) -> bool {
         self.text || (!self.csv && std::io::stdout().is_terminal())
     }
 
-    /// The folder for the report. It must not contain a file that is read.
     fn report_folder(&self) -> Result<Option<TargetFolder>, Failure> {
         let read = [Some(&self.locator), self.readings.as_ref(), self.rig.as_ref()];
         let read = read.into_iter().flatten().map(PathBuf::as_path).chain(self.tare.path());
@@ -153,7 +150,6 @@ impl Arguments {
     }
 }
 
-/// The tracker of the readings: a filter, or a filter with a smoother.
 enum Follower {
     Filter(Tracker),
     Smoother(SmoothTracker),
@@ -166,13 +162,11 @@ struct Stream<'a> {
     extent: Extent,
     format: Format,
     lines: Lines,
-    /// Number of readings so far, including skipped ones, as --rate counts them.
+    /// Number of readings, including skipped ones.
     times: u64,
-    /// The source line of each track.
     numbers: Vec<u64>,
-    /// The true contacts so far.
     truths: Vec<Vec<Contact>>,
-    /// Tracks of the filter, if a truth exists for comparison and the smoother does not store them.
+    /// Tracks for comparison with a truth, unless the smoother stores them.
     filtered: Vec<Track>,
 }
 
@@ -241,7 +235,7 @@ impl Stream<'_> {
         output::flush(out)
     }
 
-    /// The filter's tracks and the smoother's; prints the deferred ones.
+    /// Returns the tracks of filter and smoother; prints the deferred ones.
     fn finish(&mut self) -> Result<(Vec<Track>, Vec<Track>), Failure> {
         let mut out = std::io::stdout().lock();
         let Follower::Smoother(tracker) = &self.follower else {
@@ -278,7 +272,6 @@ impl Stream<'_> {
         }
     }
 
-    /// The errors of filter and smoother, if the truth is known.
     fn errors(&self, filtered: &[Track], smoothed: &[Track]) -> Vec<(&'static str, TrackErrors)> {
         let truths = &self.truths;
         let of = |name, tracks: &[Track]| {
@@ -330,24 +323,17 @@ impl Stream<'_> {
     }
 }
 
-/// Output on stdout.
 enum Format {
-    /// A JSON object per reading.
     Json,
-    /// A row per reading.
     Csv(Columns),
-    /// Text lines.
     Text(Box<ContactLines>),
 }
 
-/// Columns of the CSV; cells are empty for a contact that does not touch.
+/// Cells are empty for a contact that does not touch.
 #[derive(Clone, Copy)]
 enum Columns {
-    /// Columns of one contact on a line.
     One,
-    /// Columns of two contacts on a line.
     Two,
-    /// Columns of one contact on a plane.
     Plane,
 }
 
@@ -363,7 +349,6 @@ impl Columns {
         }
     }
 
-    /// A line of CSV.
     fn csv(self, track: &Track, line: u64) -> String {
         let (first, second) = (track.contacts.first(), track.contacts.get(1));
         let mut cells = vec![line.to_string(), track.time_s.to_string()];
@@ -417,7 +402,6 @@ fn cell(number: f64) -> String {
     if number.abs() < LARGE { format!("{number:.4}") } else { format!("{number:.4e}") }
 }
 
-/// A line of JSON: the track at the reading in line `line` of its source.
 fn json(track: &Track, line: u64, extent: Extent) -> Result<String, Failure> {
     let Position { x_m, y_m } = track.single.contact.position;
     let object = object! {
@@ -427,7 +411,7 @@ fn json(track: &Track, line: u64, extent: Extent) -> Result<String, Failure> {
         ..track.contacts.first().map(contact_fields),
         "two_touching": track.numbers[2],
         "second"?: track.contacts.get(1).map(|second| Object(contact_fields(second))),
-        // Position from this reading alone; on a plane its x and y.
+        // Position from this reading alone; on a plane x and y.
         "single_mm": match extent {
             Extent::Line { .. } => json!(x_m * 1e3),
             Extent::Plane { .. } => json!([x_m * 1e3, y_m * 1e3]),

@@ -1,38 +1,30 @@
-//! The rest after a touch: readings at which an untouched surface settles again.
-//!
-//! The reading after a touch differs from the one before it: hysteresis and creep leave a residue, and the offsets have drifted meanwhile. A
-//! reading is a rest if it is steady, and small compared with the touch.
+//! Rest after a touch: steady readings that are small compared with it.
 
 use super::{LET_GO, next_in_row};
 use crate::Status;
 
-/// Fewest consecutive steady readings of a surface at rest.
 const AT_REST: u32 = 2 * LET_GO;
-/// Shortest duration of these readings in seconds: [`AT_REST`] readings at 100 a second. Over less, the slow beginning of a touch looks steady.
+/// Shortest rest in seconds, [`AT_REST`] readings at 100 Hz; the slow beginning of a touch looks steady over
+/// less.
 const AT_REST_S: f64 = 0.1;
-/// Untouched readings after a touch that make a surface at rest, steady or not.
 const UNTOUCHED: u32 = 10 * AT_REST;
-/// Duration of these readings in seconds, where they have times.
 const UNTOUCHED_S: f64 = 10.0 * AT_REST_S;
-/// Fewest untouched readings for an estimate of the noise.
 const NOISE_KNOWN: u32 = 20;
-/// Largest size of a residue, as a share of the touch before it. Gauges on elastic surfaces leave up to 3 % by hysteresis, and as much by creep.
+/// Largest residue as a share of the touch: gauges on elastic surfaces have 3 % of hysteresis, and as much
+/// creep.
 const RESIDUE: f64 = 0.05;
-/// Largest change of a reading at rest, as a share of the touch: a tenth of the residue.
+/// Largest change at rest as a share of the touch: a tenth of the residue.
 const CHANGE: f64 = 0.1 * RESIDUE;
 
-/// State of the surface after a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Course {
-    /// No touch has ended.
     Steady,
-    /// A touch has ended, and readings have not yet come to rest.
+    /// Not yet at rest after a touch.
     Settling,
-    /// A touch has ended, and readings are at rest: their mean is [`RestWatch::rest`].
+    /// At rest after a touch.
     AtRest,
 }
 
-/// Readings that make a rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct RestLength {
     stays: u32,
@@ -40,10 +32,8 @@ pub(super) struct RestLength {
 }
 
 impl RestLength {
-    /// Numbers for readings without times.
     pub const COUNTED: Self = Self { stays: AT_REST, untouched: UNTOUCHED };
 
-    /// Numbers for readings `interval_s` apart.
     pub fn of_interval(interval_s: f64) -> Self {
         // The conversions saturate.
         let readings = |seconds: f64| libm::ceil(seconds / interval_s) as u32;
@@ -51,24 +41,17 @@ impl RestLength {
     }
 }
 
-/// Watch for the rest after a touch.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct RestWatch<B> {
-    /// Variance of the noise of each channel about the baseline, from untouched readings.
+    /// Variance of each channel about the baseline.
     noise: B,
-    /// Readings in this mean, at most a time constant.
     readings: u32,
-    /// Squared sizes of the last readings of a touch over the variance of the noise, in a ring.
     sizes: [f64; LET_GO as usize],
-    /// Readings of the touch.
     touched: u32,
-    /// Greatest squared size that [`LET_GO`] consecutive readings reached.
+    /// Greatest size of [`LET_GO`] consecutive readings.
     touch_size: f64,
-    /// Mean of the last steady readings.
     rest: B,
-    /// Readings in this mean.
     rested: u32,
-    /// Untouched readings since the touch.
     untouched: u32,
 }
 
@@ -88,32 +71,26 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> RestWatch<B> {
         }
     }
 
-    /// Mean of the readings at rest.
     pub fn rest(&self) -> &[f64] {
         self.rest.as_ref()
     }
 
-    /// True where the rest is farther from a baseline than one reading is by noise.
     pub fn has_moved(&self, baseline: &[f64]) -> bool {
         self.distance(self.rest(), baseline) > baseline.len() as f64
     }
 
-    /// Number of readings in the mean at rest.
     pub fn rested(&self) -> u32 {
         self.rested
     }
 
-    /// True unless the last readings are known to change.
     pub fn stays(&self) -> bool {
         self.readings < NOISE_KNOWN || self.rested >= LET_GO
     }
 
-    /// Forgets the touch.
     pub fn forget_touch(&mut self) {
         (self.touched, self.touch_size, self.rested, self.untouched) = (0, 0.0, 0, 0);
     }
 
-    /// Adds a reading with its status by the baseline.
     pub fn add(
         &mut self,
         reading: &[f64],
@@ -132,7 +109,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> RestWatch<B> {
         let size = self.distance(reading, baseline);
         if is_untouched {
             if self.touched < LET_GO {
-                // Noise was mistaken for a contact.
+                // Noise caused a false alarm.
                 self.forget_touch();
                 return Course::Steady;
             }
@@ -157,7 +134,6 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> RestWatch<B> {
         }
     }
 
-    /// Adds a reading to the rest, or begins another rest with it.
     fn follow_rest(&mut self, reading: &[f64]) {
         let channels = reading.len() as f64;
         // For any number of channels, noise is within 2·channels + 8 in 99.7 % of readings.
@@ -180,7 +156,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> RestWatch<B> {
         }
     }
 
-    /// Σ (a − b)² over the variances of the noise. A channel without noise, as from a coarse converter, gets the mean noise.
+    /// Σ (a − b)² / variance. A channel without noise, as from a coarse converter, gets the mean variance.
     fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
         let noise = self.noise.as_ref();
         let mean = noise.iter().sum::<f64>() / noise.len().max(1) as f64;

@@ -1,4 +1,4 @@
-//! Task of a design of training positions, and the ways in which they are placed.
+//! Task of a design of training positions.
 
 use crate::contacts::{ContactPrior, WeightedContacts};
 use crate::sensors::{SensorDesign, TOLERANCE_M};
@@ -12,39 +12,35 @@ use palpate_numerics::OutOfRange;
 use palpate_numerics::regression::RegressionError;
 use palpate_numerics::watch::Cancelled;
 
-/// Task of placing training positions: presses, estimator, contacts, and how long is searched.
-/// [`PositionProblem::new`](super::PositionProblem::new) checks it.
+/// Task of placing training positions. [`PositionProblem::new`](super::PositionProblem::new) checks it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PositionDesign {
-    /// The estimator that is calibrated; any but `auto`.
+    /// Estimator to calibrate; not `auto`.
     pub estimator: Estimator,
-    /// Training positions; at least 1.
+    /// Number of training positions; at least 1.
     pub count: usize,
-    /// Presses at each; at least 1.
+    /// Presses per position; at least 1.
     pub repeats: usize,
-    /// Present training of the surface: tells the force of the presses where that is not the contacts', and the positions that are
-    /// compared with where they are as many.
+    /// Existing training: its force and, at equal count, positions to compare with.
     pub existing: Option<Training>,
-    /// The contacts that are located after calibrating; all over the surface where `None`.
+    /// Contacts to locate; the whole surface if `None`.
     pub contacts: Option<ContactPrior>,
-    /// Whether the locator will know their force, where the setup does.
+    /// Known if the locator is given the force of the setup.
     pub force: Force,
-    /// An error up to this is good enough, in metres; greater than 0.
+    /// Tolerance of the error, m; greater than 0.
     pub tolerance_m: f64,
-    /// Simulated calibrations that an arrangement is judged by while searching; at least 1.
+    /// Simulated calibrations per score; at least 1.
     pub calibrations: usize,
-    /// Arrangements that the search may try.
+    /// Largest number of scored arrangements.
     pub trials: usize,
-    /// Calibrations with fresh noise that verify each arrangement; at least 1.
+    /// Calibrations per verification; at least 1.
     pub verifications: usize,
-    /// Presses of a recording begun are enough once endlessly many more would lower the error by less than this, in %; between 0
-    /// and 100.
+    /// Stopping rule: least further reduction of the error, %; 0 to 100.
     pub stop_percent: f64,
-    /// Fixes all noise and every network's first weights.
+    /// Seed of noise and initial weights.
     pub seed: u64,
 }
 
-/// Ten positions, pressed once each, for influence functions and contacts of known force all over the surface.
 impl Default for PositionDesign {
     fn default() -> Self {
         Self {
@@ -65,38 +61,37 @@ impl Default for PositionDesign {
 }
 
 impl PositionDesign {
-    /// As many positions and presses as an existing arrangement has, and compared with it.
+    /// Adopts an existing training, for comparison.
     pub fn for_training(existing: &Training) -> Self {
         let (count, repeats) = (existing.count, existing.repeats);
         Self { count, repeats, existing: Some(existing.clone()), ..Self::default() }
     }
 
-    /// The same for another estimator.
+    /// Sets the estimator.
     #[must_use]
     pub fn estimator(self, estimator: Estimator) -> Self {
         Self { estimator, ..self }
     }
 
-    /// The same with another number of training positions.
+    /// Sets the number of training positions.
     #[must_use]
     pub fn count(self, count: usize) -> Self {
         Self { count, ..self }
     }
 
-    /// The same with another number of presses at each.
+    /// Sets the number of presses per position.
     #[must_use]
     pub fn repeats(self, repeats: usize) -> Self {
         Self { repeats, ..self }
     }
 
-    /// The same for the contacts that sensors are designed for, with their tolerance and what is known of their force.
+    /// Adopts contacts, force and tolerance of a sensor design.
     #[must_use]
     pub fn contacts_of(self, design: &SensorDesign) -> Self {
         let SensorDesign { contacts, force, tolerance_m, .. } = design;
         Self { contacts: Some(contacts.clone()), force: *force, tolerance_m: *tolerance_m, ..self }
     }
 
-    /// Checks every number against its bound.
     pub(super) fn check(&self) -> Result<(), OutOfRange> {
         OutOfRange::check_positive([
             ("the number of training positions", self.count as f64),
@@ -107,7 +102,6 @@ impl PositionDesign {
         ])
     }
 
-    /// The contacts with their weights.
     pub(super) fn weighted_contacts(&self, extent: Extent) -> Result<WeightedContacts, OutOfRange> {
         let all_over = || ContactPrior::all_over(extent);
         WeightedContacts::from_prior(&self.contacts.clone().unwrap_or_else(all_over), extent)
@@ -118,17 +112,17 @@ impl PositionDesign {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Placement {
-    /// As they are pressed now.
+    /// The existing positions.
     Existing,
-    /// Evenly: what the others are compared with.
+    /// Even positions, the reference.
     Even,
-    /// More of them towards the ends, as the founding paper has it.
+    /// Denser towards the ends, as in the founding paper.
     EdgeDense,
-    /// Chebyshev's nodes; on a plane a grid of them.
+    /// Chebyshev nodes; on a plane a grid of them.
     Chebyshev,
-    /// The least variance of influence functions that are learnt as Gaussian processes.
+    /// Least posterior variance of the influence functions.
     VarianceOptimal,
-    /// The least error of the estimator after simulated calibrations.
+    /// Least error after simulated calibrations.
     Optimal,
 }
 
@@ -146,62 +140,62 @@ impl Placement {
     }
 }
 
-/// A setup, a design or a recording that no training positions can be found for.
+/// Reason why no training positions can be proposed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PositionError {
-    /// The design was stopped.
+    /// Cancelled.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
     /// A surface without a model.
     #[error("a measured surface has no model to simulate calibrations with")]
     NoModel,
-    /// The force of the presses is not given.
+    /// Unknown force of the presses.
     #[error("the force of the presses is not known")]
     NoForce,
-    /// The estimator is not decided on.
+    /// The estimator `auto`.
     #[error("the estimator is `auto`; positions are designed for one estimator")]
     Auto,
-    /// Fewer positions than the estimator needs.
+    /// Too few positions for the estimator.
     #[error("{count} training position(s); an estimator of kind `{kind}` needs at least {needed}")]
     TooFew {
         /// Number of training positions.
         count: usize,
         /// Least number.
         needed: usize,
-        /// The estimator's kind.
+        /// Kind of the estimator.
         kind: &'static str,
     },
-    /// The existing training positions cannot be laid out.
+    /// Invalid existing arrangement.
     #[error(transparent)]
     Arrangement(#[from] ArrangementError),
-    /// A calibration cannot be simulated.
+    /// Failed simulation of a calibration.
     #[error(transparent)]
     Calibration(#[from] EvaluationError<FitError>),
-    /// A number that is not in its range.
+    /// Value out of range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
-    /// The influence functions cannot be learnt.
+    /// Failed regression.
     #[error("the influence functions cannot be learnt: {0}")]
     Regression(#[from] RegressionError),
-    /// The recording has other channels than the setup has sensors.
+    /// Wrong number of channels.
     #[error("the recording has {found} channels; the setup has {needed} sensors")]
     Channels {
-        /// Sensors of the setup.
+        /// Number of sensors.
         needed: usize,
-        /// Channels of the recording.
+        /// Number of channels.
         found: usize,
     },
-    /// Too few places pressed to see how smooth the influence functions are.
+    /// Too few distinct positions.
     #[error(
         "the recording has {found} distinct positions; at least {needed} are needed to estimate the smoothness of the surface"
     )]
     TooFewPresses {
-        /// Number of distinct positions in the recording.
+        /// Number of distinct positions.
         found: usize,
         /// Least number.
         needed: usize,
     },
-    /// Presses of a small part of the surface, which do not tell the rest.
+    /// Presses on a small part of the surface.
     #[error(
         "the presses cover {:.1} mm of {:.1} mm along {axis}; readings elsewhere are undetermined",
         reach_m * 1e3,
@@ -210,17 +204,17 @@ pub enum PositionError {
     SmallPart {
         /// The axis, `x` or `y`.
         axis: char,
-        /// Length between the outermost presses, in metres.
+        /// Length between the outermost presses, m.
         reach_m: f64,
-        /// Length of the surface, in metres.
+        /// Length of the surface, m.
         side_m: f64,
     },
-    /// Presses of which every place reads alike.
+    /// Readings that differ only by noise.
     #[error(
         "readings at different positions differ by no more than noise; check the channels and the positions of the presses"
     )]
     NothingTold,
-    /// Presses of forces that differ on a surface without a model, of whose readings without contact nothing is known.
+    /// Unknown offsets.
     #[error("the forces of the presses differ, and the readings of the untouched surface are unknown")]
     NoOffset,
     /// A channel of unknown noise.
@@ -228,7 +222,7 @@ pub enum PositionError {
         "the noise of channel {channel} is unknown: no position was pressed twice, or its repeats are equal, and the setup states no noise"
     )]
     NoNoise {
-        /// Which channel, from 1.
+        /// Number of the channel, from 1.
         channel: usize,
     },
 }

@@ -1,4 +1,4 @@
-//! Readings as a Gaussian process of the contact's position, in units of their noise.
+//! Whitened readings as a Gaussian process of the contact position.
 
 use super::design::PositionError;
 use super::presses::{Presses, living};
@@ -16,24 +16,21 @@ use palpate_numerics::watch::Watch;
 /// Positions where a model is evaluated, along a line and along each side of a plane.
 const ASKED: usize = 60;
 const ASKED_ON_A_PLANE: usize = 14;
-/// Noise of a sensor without noise, as a share of its full scale: the error that remains is that of interpolation.
+/// Noise of a noise-free sensor, as a share of its full scale.
 const NOMINAL_NOISE: f64 = 1e-4;
-/// Candidate correlations of the process, from the roughest to the smoothest.
 const KERNELS: [Kernel; 3] = [Kernel::Matern32, Kernel::Matern52, Kernel::SquaredExponential];
 
-/// Whitened readings as functions of position.
 pub(super) struct ForwardModel {
     process: GaussianProcess,
-    /// Correlation: the candidate kernel with the largest marginal likelihood.
+    /// Correlation with the largest log evidence.
     kernel: Kernel,
-    /// The prior variance of the functions, averaged over the sensors.
+    /// Prior variance, averaged over the sensors.
     signal_variance: f64,
     extent: Extent,
     force: Force,
 }
 
 impl ForwardModel {
-    /// Forward model of a bench from the noise-free readings of its mechanics.
     pub fn from_mechanics(setup: &Setup, force: Force, watch: Watch) -> Result<Self, PositionError> {
         let surface = setup.surface().model().ok_or(PositionError::NoModel)?;
         let force_n = setup.force_n().ok_or(PositionError::NoForce)?;
@@ -60,7 +57,6 @@ impl ForwardModel {
         Self::fit(&positions, &clean, &sds, &vec![0.0; positions.len()], extent, force, watch)
     }
 
-    /// Forward model of a bench from the presses of a recording.
     pub fn from_presses(presses: &Presses, setup: &Setup, watch: Watch) -> Result<Self, PositionError> {
         let Presses { positions, readings, reading_sds, .. } = presses;
         let variances: Vec<f64> = (0..positions.len()).map(|row| presses.variance_of(row)).collect();
@@ -75,8 +71,7 @@ impl ForwardModel {
         )
     }
 
-    /// Fits to readings of the enabled channels at some positions. Readings divided by the standard deviations have the variances
-    /// `variances`, one per position.
+    /// Fits to `readings`, with the variances of the whitened readings.
     fn fit(
         positions: &[Position],
         readings: &[Vec<f64>],
@@ -107,7 +102,6 @@ impl ForwardModel {
         Ok(Self { process, kernel, signal_variance, extent, force })
     }
 
-    /// The prior covariance of a whitened reading's function at two positions.
     pub fn covariance(&self, a: Position, b: Position) -> f64 {
         let scales = &self.process.hyperparameters().length_scales;
         let r2: f64 =
@@ -115,7 +109,7 @@ impl ForwardModel {
         self.signal_variance * self.kernel.correlation(r2)
     }
 
-    /// Expected whitened reading at a position, and its slopes in 1/m: for each channel by x, and on a plane by y, side by side.
+    /// Returns expected whitened readings and slopes, 1/m: by x, on a plane by x and y, channel by channel.
     fn mean_and_slopes(&self, at: Position) -> (Vec<f64>, Vec<f64>) {
         let (outputs, d) = (self.process.outputs(), self.process.coordinates());
         let (mut means, mut slopes) = (vec![0.0; outputs], vec![0.0; outputs * d]);
@@ -129,9 +123,9 @@ impl ForwardModel {
         (means, slopes)
     }
 
-    /// Variance of each channel's whitened reading at a place with a placement error of standard deviation `sd_m` in each
-    /// direction: |I′|²·σ², to first order. If the force is unknown, the part of the slope along the reading is a change of force
-    /// and not an error.
+    /// Returns the variance of each whitened reading due to a placement error: |I′|²·σ², to first order.
+    ///
+    /// If the force is unknown, the slope along the reading is excluded: it changes only the force.
     pub fn placement_variances(&self, at: Position, sd_m: f64) -> Vec<f64> {
         let d = self.process.coordinates();
         let (means, mut slopes) = self.mean_and_slopes(at);
@@ -149,7 +143,6 @@ impl ForwardModel {
             .collect()
     }
 
-    /// Fisher information of a position in one reading of a calibrated bench, from the slopes of the expected readings.
     pub fn information(&self, at: Position) -> Information {
         let (outputs, d) = (self.process.outputs(), self.process.coordinates());
         let (means, slopes) = self.mean_and_slopes(at);
@@ -173,7 +166,7 @@ impl ForwardModel {
     }
 }
 
-/// The Fisher information of a position in one reading, in 1/m²; on a line only `xx`.
+/// Fisher information of a position, 1/m²; on a line only `xx`.
 #[derive(Clone, Copy)]
 pub(super) struct Information {
     xx: f64,
@@ -182,8 +175,9 @@ pub(super) struct Information {
 }
 
 impl Information {
-    /// Standard deviation, in metres, of a position from a reading with this noise variance, relative to that of a reading: the
-    /// information divided by it, plus that of the surface's size. In two dimensions, the standard deviation of the distance.
+    /// Returns the standard deviation of a position, m; in two dimensions of the distance.
+    ///
+    /// The information is divided by `noise_variance`; the surface's prior is added.
     pub fn sd_m(self, noise_variance: f64, extent: Extent) -> f64 {
         let told = |information: f64| information / noise_variance;
         let size = |side_m: f64| 12.0 / (side_m * side_m);

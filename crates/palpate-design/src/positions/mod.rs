@@ -1,4 +1,4 @@
-//! Placement of presses: training positions for an estimator and a number of presses.
+//! Placement of training presses for an estimator.
 //!
 //! ```
 //! use palpate_design::positions::{PositionDesign, PositionProblem, best_placed};
@@ -18,10 +18,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Rules (even, edge-dense, Chebyshev's nodes) are compared with two optima: positions with the least variance of influence
-//! functions learnt as Gaussian processes, and positions with the least error after simulated calibrations of the estimator itself.
-//! All are evaluated in the same way, by calibrations with noise that no search has used. For a recording that is not complete,
-//! [`next_press`] advises where to press next, and when to stop.
+//! Two optima, least posterior variance and least error after simulated calibrations, are compared with
+//! rules. Verifications use fresh noise. [`next_press`] advises on an incomplete recording.
 
 mod design;
 mod forward;
@@ -49,33 +47,30 @@ use palpate_numerics::mean;
 use palpate_numerics::watch::Watch;
 use search::{PatternSearch, evaluate};
 
-/// Name of the search in progress messages.
 const SEARCHING: &str = "search by calibrations";
-/// Approximate number of readings that evaluate a calibration: in a search, and in the verification.
+/// Approximate readings per calibration: in a search, in the verification.
 const READINGS_IN_SEARCH: usize = 1000;
 const READINGS: usize = 4000;
-/// Positions in the middle portion of the edge-dense arrangement, as the founding paper recommends.
+/// Middle positions of the edge-dense arrangement, as in the founding paper.
 const IN_THE_MIDDLE: usize = 4;
-/// Starts of the searches: 0 is the even positions, 1 is Chebyshev's, and larger values are denser towards the ends.
+/// Starts of the search: 0 even, 1 Chebyshev, larger denser towards the ends.
 const DENSITIES: [f64; 4] = [0.4, 0.8, 1.2, 1.6];
-/// Offset between the seeds of searches and those of verifications.
 const SEARCH_SEEDS: u64 = 1 << 32;
 
 /// Training positions and their verification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placed {
-    /// Rule or search that gave them.
+    /// Rule or search of the positions.
     pub placement: Placement,
     /// Training positions; on a line from left to right.
     pub positions: Vec<Position>,
     /// Result of calibrations with fresh noise.
     pub verification: Verification,
-    /// Mean error of these calibrations at each contact, in metres.
+    /// Mean error at each contact, m.
     pub errors_m: Vec<f64>,
 }
 
-/// The arrangement with the least mean error. Of those within twice the standard error it is the first, so that noise does not
-/// decide.
+/// Returns the first arrangement within two standard errors of the least mean error.
 pub fn best_placed(placed: &[Placed]) -> Option<&Placed> {
     let error = |placed: &Placed| placed.verification.mean_error_m;
     let least = placed.iter().min_by(|a, b| error(a).total_cmp(&error(b)))?;
@@ -86,12 +81,11 @@ pub fn best_placed(placed: &[Placed]) -> Option<&Placed> {
     placed.iter().find(as_good)
 }
 
-/// A setup and the design task of its training positions, checked.
+/// Checked setup and design task of training positions.
 pub struct PositionProblem {
     design: PositionDesign,
-    /// The setup with the force of the presses.
     pressed: Setup,
-    /// The simulated calibration, without its training positions.
+    /// Simulated calibration without training positions.
     calibration: Calibration,
     extent: Extent,
     force: Force,
@@ -99,10 +93,10 @@ pub struct PositionProblem {
 }
 
 impl PositionProblem {
-    /// Checks that the setup can be simulated and that the estimator can be fitted with this number of presses.
+    /// Checks simulation and estimator.
     ///
     /// # Errors
-    /// [`PositionError`], which names what is missing.
+    /// [`PositionError`] with the missing item.
     pub fn new(setup: &Setup, design: &PositionDesign) -> Result<Self, PositionError> {
         if setup.surface().model().is_none() {
             return Err(PositionError::NoModel);
@@ -130,17 +124,17 @@ impl PositionProblem {
         Ok(Self { design: design.clone(), pressed, calibration, extent, force, contacts })
     }
 
-    /// The design task.
+    /// Design task.
     pub fn design(&self) -> &PositionDesign {
         &self.design
     }
 
-    /// Contacts that are located after the calibration.
+    /// Contacts to locate.
     pub fn contacts(&self) -> &WeightedContacts {
         &self.contacts
     }
 
-    /// Whether the force is known to the locator: as in the design, if it is known to the setup.
+    /// Known if both the design and the setup give the force.
     pub fn force(&self) -> Force {
         self.force
     }
@@ -150,10 +144,10 @@ impl PositionProblem {
         self.extent
     }
 
-    /// All arrangements, by rule and by search, each verified.
+    /// Computes and verifies all arrangements.
     ///
     /// # Errors
-    /// [`PositionError`] if the estimator cannot be fitted to such presses, or if the watch stopped it.
+    /// [`PositionError`] if a fit fails, or if cancelled.
     pub fn all(&self, watch: Watch) -> Result<Vec<Placed>, PositionError> {
         let mut arrangements = self.by_rule()?;
         arrangements.push((Placement::VarianceOptimal, self.variance_optimal(watch)?));
@@ -168,7 +162,6 @@ impl PositionProblem {
         verified.collect()
     }
 
-    /// The arrangements of the rules, the even one first.
     fn by_rule(&self) -> Result<Vec<(Placement, Vec<Position>)>, PositionError> {
         let (extent, count) = (self.extent, self.design.count);
         let (columns, rows) = squarest(extent, count);
@@ -189,7 +182,6 @@ impl PositionProblem {
         Ok(arrangements)
     }
 
-    /// Arrangements between even positions and Chebyshev's, and some denser towards the ends.
     fn densities(&self) -> impl Iterator<Item = Vec<Position>> {
         let (extent, (columns, rows)) = (self.extent, squarest(self.extent, self.design.count));
         DENSITIES.into_iter().map(move |density| {
@@ -210,7 +202,6 @@ impl PositionProblem {
         Ok(variance::least(&forward, &self.contacts, self.extent, &self.design, watch)?)
     }
 
-    /// The best of some arrangements by simulated calibrations, followed by a pattern search over its positions.
     fn search(&self, starts: &[Vec<Position>], watch: Watch) -> Result<Vec<Position>, PositionError> {
         let (design, first) = (&self.design, self.design.seed.wrapping_add(SEARCH_SEEDS));
         let score = |positions: &[Position], share: f64| -> Result<f64, PositionError> {
@@ -229,14 +220,12 @@ impl PositionProblem {
         search.run(&score, starts[best].clone(), scores[best])
     }
 
-    /// Whether a mirrored contact gives the same readings with the sensors in reverse order.
     fn is_mirrored(&self) -> bool {
         let setup = &self.pressed;
         let (Some(surface), Some(force_n)) = (setup.surface().model(), setup.force_n()) else { return false };
         matches!(self.extent, Extent::Line { .. }) && search::reads_mirrored(surface, setup.layout(), force_n)
     }
 
-    /// Result of calibrations with fresh noise.
     fn verified(
         &self,
         placement: Placement,
@@ -255,8 +244,7 @@ impl PositionProblem {
         })
     }
 
-    /// Simulated calibrations at some positions, one per seed from the first on, each evaluated with about `readings` readings of
-    /// the contacts. A seed gives the same noise for any positions.
+    /// Simulates one calibration per seed; a seed gives equal noise at any positions.
     fn calibrate(
         &self,
         positions: &[Position],

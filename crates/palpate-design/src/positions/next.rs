@@ -1,4 +1,4 @@
-//! The next press of a recording, and when to stop.
+//! Next press of a recording, and the stopping rule.
 
 use super::design::{PositionDesign, PositionError};
 use super::forward::ForwardModel;
@@ -10,72 +10,66 @@ use palpate_mechanics::contact::Position;
 use palpate_numerics::watch::Watch;
 use palpate_numerics::{OutOfRange, mean, random_order};
 
-/// Largest number of future presses.
 const MOST_AHEAD: usize = 200;
-/// Largest number of recorded positions that are used. With more, this number is drawn at random, which slightly overstates the
-/// gain.
+/// Largest number of recorded positions in use; a random subset of more overestimates the gain slightly.
 const MOST_PRESSED: usize = 1000;
 
-/// The error after infinitely many presses must be below this share of a guess's error; otherwise readings differ between positions
-/// only by noise.
+/// Largest ratio of the limit to the error of a guess; above it readings differ only by noise.
 const MOST_OF_A_GUESS: f64 = 0.5;
 
-/// A future press.
+/// Proposed press.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NextPress {
-    /// Position to press.
+    /// Position of the press.
     pub position: Position,
-    /// Expected error after this press, in metres.
+    /// Expected error after this press, m.
     pub error_m: f64,
 }
 
-/// Advice on a recording: its expected error, and the gain from more presses.
+/// Expected error of a recording, and the gain from more presses.
 ///
-/// Errors are standard deviations, in metres, averaged over the contacts: the limit, with the posterior variance of the influence
-/// functions counted as noise.
+/// Errors are standard deviations, m, averaged over the contacts. The posterior variance counts as noise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Advice {
     /// Number of rows with a contact.
     pub presses: usize,
-    /// Number of pressed places.
+    /// Number of distinct positions.
     pub positions: usize,
-    /// Expected error of a locator fitted now.
+    /// Expected error of the present calibration.
     pub error_m: f64,
     /// Error after infinitely many presses: the limit.
     pub endless_error_m: f64,
-    /// The next presses, each the most useful one, until the stopping rule is met; empty if it is met now, and not longer than
-    /// [`Advice::MOST_AHEAD`].
+    /// Best next presses until the stopping rule is met, at most [`Advice::MOST_AHEAD`].
     pub next: Vec<NextPress>,
-    /// The rule: stop if infinitely many more presses would lower the error by less than this, in %.
+    /// Stopping rule: least further reduction of the error, %.
     pub stop_percent: f64,
 }
 
 impl Advice {
-    /// Largest number of future presses.
+    /// Largest number of proposed presses.
     pub const MOST_AHEAD: usize = MOST_AHEAD;
 
-    /// Reduction of the error by infinitely many more presses, in %.
+    /// Returns the reduction of the error by infinitely many presses, %.
     pub fn remaining_gain_percent(&self) -> f64 {
         100.0 * (1.0 - self.endless_error_m / self.error_m)
     }
 
-    /// True if the stopping rule is met.
+    /// Returns true if the stopping rule is met.
     pub fn is_enough(&self) -> bool {
         self.remaining_gain_percent() < self.stop_percent
     }
 
-    /// Whether the stopping rule is met after the presses in `next`.
+    /// Returns true if the presses in `next` meet the stopping rule.
     pub fn reaches_goal(&self) -> bool {
         let last_m = self.next.last().map_or(self.error_m, |press| press.error_m);
         100.0 * (1.0 - self.endless_error_m / last_m) < self.stop_percent
     }
 }
 
-/// Advises where to press next, for the contacts of a design and until its stopping rule is met.
+/// Proposes the next presses for the contacts of a design.
 ///
-/// Influence functions are Gaussian processes with smoothness and noise estimated from the recording; no model of the surface is
-/// needed. If the recording, or else the design's training, states the placement error, a press has the variance |I′|²·σ² besides
-/// its noise.
+/// Influence functions are Gaussian processes, estimated from the recording without a model. A stated
+/// placement error adds the variance |I′|²·σ² to a press.
 ///
 /// ```
 /// use palpate_design::positions::{PositionDesign, next_press};
@@ -95,7 +89,7 @@ impl Advice {
 /// ```
 ///
 /// # Errors
-/// [`PositionError`] if the recording does not belong to the setup or is too short, or if the watch stopped it.
+/// [`PositionError`] for a recording that is too short or of another setup, or if cancelled.
 pub fn next_press(
     setup: &Setup,
     recording: &Recording,
@@ -155,7 +149,6 @@ pub fn next_press(
     Ok(advice)
 }
 
-/// All positions up to [`MOST_PRESSED`], or a random selection of this number.
 fn few_of(places: &[(Position, usize)]) -> Vec<(Position, usize)> {
     let mut drawn: Vec<usize> = random_order(places.len(), 0).into_iter().take(MOST_PRESSED).collect();
     drawn.sort_unstable();

@@ -1,6 +1,4 @@
-//! Presses of a recording as readings of the position alone, and their noise.
-//!
-//! Readings have the offsets subtracted, and are scaled to one force; if the force is unknown in use, to one amplitude.
+//! Presses of a recording, scaled to one force (or amplitude), and their noise.
 
 use super::design::PositionError;
 use palpate_estimators::recording::{Recording, Row, is_one_force};
@@ -12,46 +10,41 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::mean;
 use palpate_numerics::small::dot;
 
-/// Least number of distinct positions from which the smoothness of a function can be estimated.
+/// Least number of distinct positions for an estimate of the smoothness.
 const FEWEST_POSITIONS: usize = 4;
-/// Share of a surface's side that the presses must cover.
+/// Share of a side that the presses must cover.
 const LEAST_REACH: f64 = 0.1;
-/// Number of untouched rows up to which their noise is not estimated.
+/// Largest number of untouched rows without a noise estimate.
 const FEWEST_UNTOUCHED: usize = 4;
 /// Quantile of the standard normal distribution at 95 %.
 const ONE_SIDED_95: f64 = 1.644_853_626_951_472_2;
-/// Rounds in which presses are scaled to one amplitude.
 const AMPLITUDE_ROUNDS: usize = 8;
-/// Relative variance of the forces at one position (by their squared mean) below which they count as one force.
+/// Relative variance below which forces are equal.
 const NEGLIGIBLE_SPREAD: f64 = 1e-12;
 
-/// Presses of the enabled channels.
 pub(super) struct Presses {
-    /// Position of each press.
     pub positions: Vec<Position>,
-    /// Reading of each press minus the offsets, one value per enabled channel.
+    /// Readings minus offsets, one value per enabled channel.
     pub readings: Vec<Vec<f64>>,
-    /// Distinct positions, each with the number of its presses.
     pub places: Vec<(Position, usize)>,
-    /// Standard deviation of a reading in use, per enabled channel.
     pub reading_sds: Vec<f64>,
-    /// Noise variance of a press, relative to that of a reading: less than 1 if a press is the mean of many readings.
+    /// Noise variance relative to a reading; below 1 for means of readings.
     pub variance: f64,
-    /// Standard deviation of a press, and the one that the setup states for a reading, per enabled channel.
+    /// Standard deviations per enabled channel: of a press, and as stated for a reading.
     press_sds: Vec<f64>,
     stated_sds: Vec<f64>,
-    /// Noise that is known apart from the presses: the stated noise, or that of the untouched rows; 0 if there is none.
+    /// Stated noise, else noise of the untouched rows, else 0.
     quiet_sds: Vec<f64>,
-    /// Presses at places that were pressed more than once, and the degrees of freedom of their scatter.
+    /// Repeated presses, and degrees of freedom of their scatter.
     repeated: Vec<usize>,
     freedom: usize,
-    /// Variance of each press due to its placement error, relative to that of a reading; empty if the placement error is unknown.
+    /// Relative variances due to placement; empty if unknown.
     placement_variances: Vec<f64>,
 }
 
 impl Presses {
-    /// Presses of a recording of a setup. Their noise is estimated from repeats, or else taken from the setup. No reading in use
-    /// has less noise than the setup states; the sensors of a model have no offsets.
+    /// Reads the presses. Noise comes from repeats, else from the setup; a reading has at least the stated
+    /// noise.
     pub fn new(recording: &Recording, setup: &Setup) -> Result<Self, PositionError> {
         let layout = setup.layout();
         if recording.channels.len() != layout.len() {
@@ -110,7 +103,6 @@ impl Presses {
         Ok(presses)
     }
 
-    /// Sets the noise of a reading in use, and of a press relative to it, from the scatter of presses and the stated noise.
     fn whiten(&mut self) {
         let sds = self.press_sds.iter().zip(&self.stated_sds);
         self.reading_sds = sds.map(|(sd, stated)| sd.max(*stated)).collect();
@@ -118,17 +110,16 @@ impl Presses {
             mean(self.press_sds.iter().zip(&self.reading_sds).map(|(press, sd)| (press / sd).powi(2)));
     }
 
-    /// Variance of a press, relative to that of a reading: of its noise and of its placement.
     pub fn variance_of(&self, press: usize) -> f64 {
         self.variance + self.placement_variances.get(press).unwrap_or(&0.0)
     }
 
-    /// Removes the contribution of the placement from the scatter of repeats, and gives each press the variance of its place.
-    /// `placed` is the variance of each channel's whitened reading due to the placement at each press.
+    /// Separates the placement error from the scatter of repeats. `placed` is its variance in each whitened
+    /// reading.
     ///
-    /// Repeats are placed one by one, so their scatter s² contains both noise and placement: the noise is s²·(1 − p), where p·s² is
-    /// the mean of the placement's variance at the places with repeats. With ν degrees of freedom the standard error of s² is
-    /// s²·√(2/ν). If this does not resolve the noise, it is the stated noise or that of the untouched rows, or its bound of 95 %.
+    /// The scatter s² contains noise s²·(1 − p) and placement p·s², the mean of `placed` over repeated
+    /// presses. The standard error of s² is s²·√(2/ν) for ν degrees of freedom. If this does not resolve the
+    /// noise, the stated or untouched noise is used, or the 95 % bound.
     pub fn place_with(&mut self, placed: &[Vec<f64>]) {
         let before = self.reading_sds.clone();
         if self.freedom > 0 {
@@ -149,7 +140,6 @@ impl Presses {
         self.placement_variances = placed.iter().map(variance).collect();
     }
 
-    /// Checks that the presses cover enough of a surface to determine how readings change on it.
     pub fn check_reach(&self, extent: Extent) -> Result<(), PositionError> {
         let check = |axis: char, coordinate: fn(Position) -> f64, side_m: f64| {
             let along = || self.places.iter().map(|(position, _)| coordinate(*position));
@@ -164,12 +154,10 @@ impl Presses {
     }
 }
 
-/// Indices of the enabled sensors.
 pub(super) fn living(layout: &Layout) -> impl Iterator<Item = usize> {
     (0..layout.len()).filter(|s| !layout.sensors()[*s].channel.dead)
 }
 
-/// Indices of the presses of each position.
 fn by_position(presses: &[&Row]) -> Vec<Vec<usize>> {
     let order = |a: &usize, b: &usize| presses[*a].position.cmp_by_x_then_y(&presses[*b].position);
     let mut indices: Vec<usize> = (0..presses.len()).collect();
@@ -177,13 +165,12 @@ fn by_position(presses: &[&Row]) -> Vec<Vec<usize>> {
     indices.chunk_by(|a, b| order(a, b).is_eq()).map(<[usize]>::to_vec).collect()
 }
 
-/// True if the presses have forces that differ.
 fn forces_differ(presses: &[&Row]) -> bool {
     !is_one_force(presses.iter().filter_map(|row| row.force_n))
 }
 
-/// Offsets of the channels from presses of one position at several forces: least squares of reading = offset + force × g(position),
-/// with a separate g for each position. `None` if the forces do not determine them.
+/// Estimates offsets by least squares of reading = offset + force × g(position); `None` if the forces do not
+/// determine them.
 fn offsets(presses: &[&Row], groups: &[Vec<usize>], channels: usize) -> Option<Vec<f64>> {
     let (mut sums, mut weight) = (vec![0.0; channels], 0.0);
     for group in groups {
@@ -200,7 +187,6 @@ fn offsets(presses: &[&Row], groups: &[Vec<usize>], channels: usize) -> Option<V
     is_told.then(|| sums.into_iter().map(|sum| sum / weight).collect())
 }
 
-/// Readings of some channels minus their offsets, if there are any, scaled to the mean force if forces are known.
 fn at_one_force(presses: &[&Row], channels: &[usize], offsets: &[f64]) -> Vec<Vec<f64>> {
     let forces: Option<Vec<f64>> =
         presses.iter().map(|row| row.force_n.filter(|force_n| *force_n > 0.0)).collect();
@@ -213,7 +199,7 @@ fn at_one_force(presses: &[&Row], channels: &[usize], offsets: &[f64]) -> Vec<Ve
     presses.iter().enumerate().map(scaled).collect()
 }
 
-/// Standard deviation of a channel about its means at each position; `None` where no position was pressed twice.
+/// Pooled standard deviation of repeats, if above 0.
 fn scatter(readings: &[Vec<f64>], repeated: &[Vec<usize>], channel: usize) -> Option<f64> {
     let (mut squares, mut freedom) = (0.0, 0usize);
     for group in repeated {
@@ -224,7 +210,7 @@ fn scatter(readings: &[Vec<f64>], repeated: &[Vec<usize>], channel: usize) -> Op
     (freedom > 0).then(|| (squares / freedom as f64).sqrt()).filter(|sd| *sd > 0.0)
 }
 
-/// Noise of a channel from the differences of successive untouched rows, to which a slow drift adds little; 0 with too few rows.
+/// Noise from differences of successive rows, robust against slow drift; 0 with too few rows.
 fn scatter_of_successive(untouched: &[&Row], channel: usize) -> f64 {
     if untouched.len() <= FEWEST_UNTOUCHED {
         return 0.0;
@@ -234,11 +220,10 @@ fn scatter_of_successive(untouched: &[&Row], channel: usize) -> f64 {
     (0.5 * mean(squares)).sqrt()
 }
 
-/// Scales the presses of each position to one amplitude, as location at an unknown force uses only the shape of a reading: their
-/// different forces or depths are not noise. Updates the channels' standard deviations from the residuals orthogonal to the mean.
+/// Scales the presses of each position to one amplitude and updates the standard deviations.
 ///
-/// With whitened readings u and their mean m at the position, u becomes u − (u·m/m·m − 1)·m; the share 1 − m_j²/m·m of a channel's
-/// variance remains.
+/// With whitened readings u and their mean m, u becomes u − (u·m/m·m − 1)·m. The share 1 − m_j²/m·m of a
+/// channel's variance remains.
 fn bring_to_one_amplitude(readings: &mut [Vec<f64>], repeated: &[Vec<usize>], sds: &mut [f64]) {
     // The direction orthogonal to the mean depends on the noise; a few rounds converge.
     for _ in 0..AMPLITUDE_ROUNDS {

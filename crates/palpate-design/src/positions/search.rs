@@ -6,17 +6,16 @@ use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::{Extent, Surface};
 
-/// A move must lower the score by more than this share of it.
+/// Least relative gain of a move.
 const LEAST_GAIN: f64 = 1e-3;
-/// Final step of the search, as a share of the length.
+/// Final step, as a share of the length.
 const FINEST_STEP: f64 = 1e-3;
-/// Least distance of positions from the edges, as a share of the length.
+/// Least distance from the edges, as a share of the length.
 const EDGE: f64 = 1e-3;
 
-/// The score of an arrangement, the smaller the better. The second argument is the completed share of the search.
+/// Score, smaller is better. The second argument is the completed share of the search.
 pub(super) type Score<'a> = dyn Fn(&[Position], f64) -> Result<f64, PositionError> + Sync + 'a;
 
-/// The scores of some arrangements, computed in parallel.
 pub(super) fn evaluate(
     score: &Score,
     arrangements: &[Vec<Position>],
@@ -38,17 +37,14 @@ pub(super) fn evaluate(
     Ok(scores)
 }
 
-/// Pattern search by ever smaller steps of one position at a time, or of one and its mirror image (Hooke and Jeeves 1961).
+/// Pattern search that moves one position or a mirrored pair (Hooke and Jeeves 1961).
 pub(super) struct PatternSearch {
     pub extent: Extent,
-    /// Whether positions that mirror each other move together.
     pub mirrored: bool,
-    /// Largest number of arrangements.
     pub most_trials: usize,
 }
 
 impl PatternSearch {
-    /// The best arrangement found from `start` with its score.
     pub fn run(
         &self,
         score: &Score,
@@ -88,7 +84,7 @@ impl PatternSearch {
         Ok(best)
     }
 
-    /// Positions that move together, by their indices: pairs if all of them mirror each other.
+    /// Groups positions that move together: mirrored pairs if all are mirrored.
     fn groups(&self, positions: &[Position]) -> Vec<(usize, Option<usize>)> {
         let last = positions.len() - 1;
         let slack_m = 1e-9 * self.extent.length_m();
@@ -103,8 +99,7 @@ impl PatternSearch {
         }
     }
 
-    /// The arrangements with one group moved in either direction, on a plane along both sides. Moves off the surface or past
-    /// another position are omitted.
+    /// Moves one group in each direction, not off the surface or past another position.
     fn moves(
         &self,
         positions: &[Position],
@@ -134,8 +129,7 @@ impl PatternSearch {
     }
 }
 
-/// Whether a mirrored contact on a line gives the same readings with the sensors in reverse order; up to signs, which slopes and
-/// some other kinds change.
+/// Returns true if a mirrored contact gives the reverse readings, up to signs.
 pub(super) fn reads_mirrored(surface: &dyn Surface, layout: &Layout, force_n: f64) -> bool {
     const ASKED: usize = 7;
     let length_m = surface.extent().length_m();

@@ -14,7 +14,6 @@ use palpate_numerics::watch::{Cancelled, Progress};
 
 use crate::fixtures::{Example, noisy, paper, plate};
 
-/// This number of positions, pressed once each, in a short search.
 fn short(design: PositionDesign, count: usize) -> PositionDesign {
     PositionDesign { count, repeats: 1, calibrations: 2, trials: 20, verifications: 4, ..design }
 }
@@ -23,7 +22,7 @@ fn problem(example: Example, count: usize) -> Result<PositionProblem, PositionEr
     PositionProblem::new(&example.setup, &short(example.design, count))
 }
 
-/// A score by the positions themselves: the distance of each from its wanted place.
+/// Score: distances of the positions from their wanted places.
 fn off(wanted_m: &[f64]) -> impl Fn(&[Position], f64) -> Result<f64, PositionError> + Sync {
     move |positions, _| {
         Ok(positions.iter().zip(wanted_m).map(|(at, wanted_m)| (at.x_m - wanted_m).powi(2)).sum())
@@ -226,10 +225,9 @@ fn the_expected_error_is_never_more_than_a_guess() {
     assert!((prior_m / guess_m - 1.0).abs() < 1e-6, "{prior_m} {guess_m}");
 }
 
-/// Ten positions all over the beam.
 const TEN_M: [f64; 10] = [0.02, 0.06, 0.1, 0.14, 0.18, 0.22, 0.26, 0.3, 0.34, 0.38];
 
-/// Presses of 1, 2 and 4 N at every position on channels of counts, which read 5,000 without contact.
+/// Presses of 1, 2 and 4 N on channels of counts with an offset of 5,000.
 fn in_counts(positions_m: &[f64], untouched: usize) -> (Setup, Recording) {
     let (setup, mut recording) = begun(positions_m, 3);
     for (row, force_n) in recording.rows.iter_mut().zip([1.0, 2.0, 4.0].into_iter().cycle()) {

@@ -1,9 +1,8 @@
-//! Positions with the least posterior variance of influence functions learnt as Gaussian processes.
+//! Positions with the least posterior variance of the influence functions.
 //!
-//! The noise variance of a reading is 1, and the expected reading has a posterior variance v. A locator therefore has noise of
-//! √(1 + v), and a reading contributes 1/(1 + v) of its information at the limit. The surface's size contributes the rest, so without
-//! any presses the error is that of a guess. Greedy choice and exchange minimize the mean over the contacts (Krause, Singh and
-//! Guestrin, *Journal of Machine Learning Research* 9, 2008, choose sensors of fields in this way).
+//! A reading has noise variance 1, and its expectation the posterior variance v. It contributes 1/(1 + v) of
+//! the information at the limit, besides the prior of the surface. Greedy choice and exchange minimize the
+//! mean over the contacts (Krause, Singh and Guestrin, *Journal of Machine Learning Research* 9, 2008).
 
 use ndarray::Array2;
 
@@ -18,14 +17,11 @@ use palpate_numerics::watch::{Cancelled, Watch};
 /// Candidate sites along a line, and along each side of a plane.
 const SITES: usize = 200;
 const SITES_ON_A_PLANE: usize = 20;
-/// Largest number of contacts that are used.
 const MOST_CONTACTS: usize = 400;
-/// Limit of the rounds of exchange, far above that of any search.
 const MOST_ROUNDS: usize = 50;
 
-/// Sites to press, contacts to locate, and the expected error at the contacts.
 pub(super) struct ExpectedError {
-    /// The sites, then the contacts.
+    /// Sites, then contacts.
     pub places: Vec<Position>,
     sites: usize,
     weights: Vec<f64>,
@@ -52,12 +48,11 @@ impl ExpectedError {
         }
     }
 
-    /// Indices of the sites.
     pub fn sites(&self) -> std::ops::Range<usize> {
         0..self.sites
     }
 
-    /// Mean over the contacts of the standard deviation of their estimated positions, in metres; `variance` is that at a place.
+    /// Mean standard deviation of positions, m, with the posterior `variance` at a place.
     pub fn error_m(&self, variance: impl Fn(usize) -> f64) -> f64 {
         let contacts = self.weights.iter().zip(&self.information).enumerate();
         contacts
@@ -65,7 +60,7 @@ impl ExpectedError {
             .sum()
     }
 
-    /// The best site for the next presses, and the expected error after them; `noise` is their variance at a site.
+    /// Best site and the error after a press of variance `noise`.
     pub fn best(&self, posterior: &Posterior, noise: impl Fn(usize) -> f64) -> (usize, f64) {
         let after = |site: usize| self.error_m(|place| posterior.variance_after(place, site, noise(site)));
         let all = self.sites().map(|site| (site, after(site)));
@@ -73,14 +68,13 @@ impl ExpectedError {
     }
 }
 
-/// Covariances of a whitened reading's function at some places, given the presses.
+/// Posterior covariances of a whitened reading's function.
 #[derive(Clone)]
 pub(super) struct Posterior {
     covariance: Array2<f64>,
 }
 
 impl Posterior {
-    /// The prior: covariances before any press.
     pub fn prior(forward: &ForwardModel, places: &[Position]) -> Self {
         let covariance = Array2::from_shape_fn((places.len(), places.len()), |(a, b)| {
             forward.covariance(places[a], places[b])
@@ -88,8 +82,7 @@ impl Posterior {
         Self { covariance }
     }
 
-    /// Conditions on the mean of presses at a place, with a noise `variance` relative to that of a reading:
-    /// C − c·cᵀ/(C_pp + variance), c = C's column of the place.
+    /// Conditions on a press: C − c·cᵀ/(C_pp + variance), with c the column of the place in C.
     pub fn condition(&mut self, place: usize, variance: f64) {
         let column = self.covariance.column(place).to_owned();
         let scale = 1.0 / (column[place] + variance);
@@ -98,19 +91,16 @@ impl Posterior {
         }
     }
 
-    /// The posterior variance at a place.
     pub fn variance(&self, place: usize) -> f64 {
         self.covariance[[place, place]].max(0.0)
     }
 
-    /// The posterior variance at `place` after presses at another place.
     pub fn variance_after(&self, place: usize, pressed: usize, variance: f64) -> f64 {
         let c = self.covariance[[place, pressed]];
         (self.variance(place) - c * c / (self.variance(pressed) + variance)).max(0.0)
     }
 }
 
-/// The positions with the least expected error: greedy choice, then exchange until the error stays.
 pub(super) fn least(
     forward: &ForwardModel,
     contacts: &WeightedContacts,

@@ -1,4 +1,4 @@
-//! Assessment of a layout by any method: by the limit, by simulated calibrations, and against fewer sensors.
+//! Assessment of layouts.
 
 use std::ops::RangeInclusive;
 
@@ -21,40 +21,38 @@ use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::Watch;
 
-/// Training positions along a line, and along each side of a plane, of the calibrations that verify a layout; and the number of
-/// presses at each.
+/// Training of the verification: positions along a line and along a plane's sides, presses per position.
 const TRAINING_ALONG_A_LINE: usize = 30;
 const TRAINING_ALONG_A_PLANE: usize = 8;
 const PRESSES: usize = 20;
-/// Approximate number of readings that evaluate a calibration.
+/// Approximate number of readings per calibration.
 const READINGS: usize = 4000;
-/// A number of sensors is sufficient if its score lies within this share of the score of the largest number.
+/// Relative tolerance of a sufficient score.
 const ENOUGH: f64 = 0.1;
 
-/// Figures of merit of a layout for the contacts of a design. With an unknown force, contacts over a support are excluded.
+/// Figures of merit, without contacts over a support if the force is unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Assessment {
-    /// Value of the criterion, the smaller the better: a limit in metres, a share, or ½·ln det.
+    /// Criterion, smaller is better: a limit in m, a share, or ½·ln det.
     pub score: f64,
-    /// The mean limit in metres; `None` if the readings do not determine some contact.
+    /// Mean limit, m; `None` for an undetermined contact.
     pub mean_limit_m: Option<f64>,
-    /// The largest limit in metres; `None` if the readings do not determine some contact.
+    /// Largest limit, m; `None` for an undetermined contact.
     pub worst_limit_m: Option<f64>,
-    /// Mean over the contacts of the mean error of an estimator at the limit, in metres; `None` if the readings do not determine
-    /// some contact.
+    /// Mean absolute error at the limit, m; `None` for an undetermined contact.
     pub mean_error_m: Option<f64>,
-    /// Share of the contacts with a limit within the tolerance, in %.
+    /// Share of the contacts with a limit within the tolerance, %.
     pub within_tolerance_percent: f64,
-    /// The worst score with one sensor missing; `None` for a single sensor.
+    /// Worst score with one sensor missing, if several.
     pub score_one_dead: Option<f64>,
     /// Cost of the sensors.
     pub cost: f64,
-    /// Whether the layout meets all constraints.
+    /// True if the layout meets all constraints.
     pub keeps_constraints: bool,
 }
 
 impl SensorProblem<'_> {
-    /// Assesses a layout of this problem or any other layout on the surface.
+    /// Assesses any layout on the surface.
     ///
     /// # Errors
     /// [`DesignError::Limit`] if a sensor has no noise or all sensors are disabled.
@@ -90,7 +88,6 @@ impl SensorProblem<'_> {
         })
     }
 
-    /// The criterion's value, and the worst value with one sensor missing.
     fn scores(&self, layout: &Layout) -> (f64, Option<f64>) {
         let live = layout.sensors().iter().filter(|sensor| !sensor.channel.dead);
         let rows = self.sensitivity.rows(&live.map(SensorAt::from).collect::<Vec<_>>());
@@ -107,7 +104,7 @@ impl SensorProblem<'_> {
         (value(None), one_dead.filter(|_| rows.len() > 1))
     }
 
-    /// Cost of a layout by the offers; other kinds cost 0.
+    /// Cost by the offers; other kinds cost 0.
     fn cost(&self, layout: &Layout) -> f64 {
         layout
             .sensors()
@@ -121,8 +118,7 @@ impl SensorProblem<'_> {
         self.pool.design.offers.iter().position(|offer| offer.kind == sensor.kind)
     }
 
-    /// Whether a layout has the requested count, includes the fixed sensors, and meets spacing, zones, budget and symmetry. Sites
-    /// of the layout need not be candidates.
+    /// Checks the constraints; sites need not be candidates.
     fn keeps_constraints(&self, layout: &Layout) -> bool {
         let (design, extent) = (&self.pool.design, self.pool.extent);
         let placed: Option<Vec<PlacedSensor>> = layout
@@ -153,12 +149,13 @@ impl SensorProblem<'_> {
 }
 
 impl SensorProblem<'_> {
-    /// Calibrates the layout at even training positions with the design's force, `calibrations` times with fresh noise, and locates
-    /// readings of the design's contacts. The design states whether their force is known to the locator. The estimator is
-    /// `estimator` if that inverts influence functions, else the default for the surface.
+    /// Calibrates at even positions, `calibrations` times with fresh noise, and locates the design's
+    /// contacts.
+    ///
+    /// An `estimator` that does not invert influence functions is replaced by the surface's default.
     ///
     /// # Errors
-    /// [`EvaluationError`] when the locator cannot be fitted, or the watch stopped it.
+    /// [`EvaluationError`] if a fit fails, or if cancelled.
     pub fn verify(
         &self,
         layout: &Layout,
@@ -193,10 +190,10 @@ impl SensorProblem<'_> {
         Ok(Verification::from_calibrations(&judged, contacts, self.pool.design.tolerance_m))
     }
 
-    /// Even and designed layouts for each number of sensors.
+    /// Computes even and designed layouts for each number of sensors.
     ///
     /// # Errors
-    /// [`DesignError`] for the largest number, or else for the first number without a layout.
+    /// [`DesignError`] for the largest number, or else for the first without a layout.
     pub fn counts(
         &self,
         range: RangeInclusive<usize>,
@@ -221,13 +218,13 @@ impl SensorProblem<'_> {
 pub struct CountPoint {
     /// Number of sensors.
     pub count: usize,
-    /// The even layout; `None` if there is none.
+    /// Even layout; `None` if there is none.
     pub even: Option<Assessment>,
-    /// The layout by greedy choice and exchange.
+    /// Layout by greedy choice and exchange.
     pub designed: Assessment,
 }
 
-/// The least number of sensors with a score within 10 % of the score of the largest number; `None` without points.
+/// Returns the least number of sensors with a score within 10 % of the last point's.
 pub fn enough(points: &[CountPoint]) -> Option<usize> {
     let least = points.last()?.designed.score;
     let bound = least + ENOUGH * least.abs();

@@ -1,4 +1,4 @@
-//! Candidates of searches: the sensors that a layout may have, one or two at a time, and which of them exclude each other.
+//! Candidates of searches: sensors or mirrored pairs, and their exclusions.
 
 use std::collections::HashMap;
 
@@ -8,10 +8,10 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{SensorKind, even_positions};
 use palpate_mechanics::surface::{Extent, Surface};
 
-/// Places closer than this share of the length are equal.
+/// Distance of equal places, relative to the length.
 const SAME: f64 = 1e-6;
 
-/// A sensor of one of the offered kinds at a position of the surface.
+/// Sensor of an offered kind at a position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlacedSensor {
     /// Index of the offer.
@@ -21,22 +21,19 @@ pub struct PlacedSensor {
 }
 
 impl PlacedSensor {
-    /// Whether both have one offer and one place.
     pub(super) fn is_same(&self, other: &Self, extent: Extent) -> bool {
         self.offer == other.offer && self.position.distance_m(other.position) <= SAME * extent.length_m()
     }
 }
 
-/// Every sensor that a layout may have.
 #[derive(Clone)]
 pub(super) struct Candidates {
     pub sensors: Vec<PlacedSensor>,
-    /// Indices of the fixed sensors.
     pub must_have: Vec<usize>,
 }
 
 impl Candidates {
-    /// The fixed sensors, and all offers at all sites where they can read something and no constraint forbids them.
+    /// Collects the fixed sensors, and all sensitive, permitted offers.
     pub fn new(surface: &dyn Surface, design: &SensorDesign) -> Result<Self, DesignError> {
         let extent = surface.extent();
         let sites = sites(&design.sites, extent);
@@ -86,7 +83,6 @@ impl Candidates {
         Ok(())
     }
 
-    /// Index of a sensor among the candidates; adds it if it is missing.
     fn add(&mut self, sensor: PlacedSensor, extent: Extent) -> usize {
         self.sensors.iter().position(|other| other.is_same(&sensor, extent)).unwrap_or_else(|| {
             self.sensors.push(sensor);
@@ -94,7 +90,7 @@ impl Candidates {
         })
     }
 
-    /// For each candidate the index of its mirror image; in the middle, its own.
+    /// Indices of mirror images; in the middle the own index.
     pub fn twins(&self, extent: Extent) -> Vec<Option<usize>> {
         let grain_m = SAME * extent.length_m();
         let key = |sensor: &PlacedSensor| {
@@ -113,12 +109,10 @@ impl Candidates {
     }
 }
 
-/// The mirror image across the middle of the length.
 pub(super) fn mirrored(position: Position, extent: Extent) -> Position {
     Position { x_m: extent.length_m() - position.x_m, ..position }
 }
 
-/// Candidate sites; on a plane row by row.
 fn sites(sites: &Sites, extent: Extent) -> Vec<Position> {
     let every = |every_m: f64, size_m: f64| {
         let steps = (size_m / every_m + 1e-6).floor() as usize;
@@ -133,14 +127,12 @@ fn sites(sites: &Sites, extent: Extent) -> Vec<Position> {
     }
 }
 
-/// Whether a sensor at a place responds to a contact anywhere on the surface.
 pub(super) fn reads_something(surface: &dyn Surface, kind: SensorKind, position: Position) -> bool {
     let still = surface.insensitive_sensor(kind, position).is_some();
     let carried = kind != SensorKind::Reaction || surface.is_supported_at(position);
     !still && carried && kind != SensorKind::Raw
 }
 
-/// Checks that no two fixed sensors exclude each other.
 fn check_must_haves(
     candidates: &Candidates,
     design: &SensorDesign,
@@ -161,7 +153,7 @@ fn check_must_haves(
     Ok(())
 }
 
-/// One sensor, or two that mirror each other.
+/// One sensor, or a mirrored pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Unit {
     pub first: usize,
@@ -178,21 +170,16 @@ impl Unit {
     }
 }
 
-/// Candidates, with the constraints of their layouts.
 pub(super) struct Pool {
     pub design: SensorDesign,
     pub extent: Extent,
     pub sensors: Vec<PlacedSensor>,
-    /// Units that can be chosen.
     pub units: Vec<Unit>,
-    /// Units of the fixed sensors.
     pub fixed: Vec<usize>,
-    /// Cost of the cheapest sensor.
     cheapest: f64,
 }
 
 impl Pool {
-    /// The units of some candidates.
     pub fn new(candidates: Candidates, design: &SensorDesign, extent: Extent) -> Result<Self, DesignError> {
         let sites = candidates.sensors.len();
         if sites < design.count {
@@ -213,27 +200,22 @@ impl Pool {
         Ok(pool)
     }
 
-    /// The candidates of a selection of units.
     pub fn candidates(&self, selection: &[usize]) -> Vec<usize> {
         selection.iter().flat_map(|unit| self.units[*unit].members()).collect()
     }
 
-    /// Number of sensors of a selection.
     pub fn size(&self, selection: &[usize]) -> usize {
         selection.iter().map(|unit| self.units[*unit].size()).sum()
     }
 
-    /// Whether a selection has the requested number of sensors.
     pub fn is_whole(&self, selection: &[usize]) -> bool {
         self.size(selection) == self.design.count
     }
 
-    /// All units.
     pub fn all(&self) -> Vec<usize> {
         (0..self.units.len()).collect()
     }
 
-    /// Cost of a selection.
     pub fn cost(&self, selection: &[usize]) -> f64 {
         selection.iter().map(|unit| self.unit_cost(*unit)).sum()
     }
@@ -243,7 +225,6 @@ impl Pool {
         self.units[unit].members().map(cost).sum()
     }
 
-    /// Whether a layout may include both units.
     pub fn go_together(&self, a: usize, b: usize) -> bool {
         // With very many candidates this is called very often.
         if a == b || excludes_nothing(&self.design) {
@@ -257,12 +238,11 @@ impl Pool {
         })
     }
 
-    /// Whether a unit may join a selection that is still to be completed.
     pub fn may_join(&self, selection: &[usize], unit: usize) -> bool {
         !self.joinable(selection, &[unit], None).is_empty()
     }
 
-    /// The units that may join a selection; `selection` lacks only sensors of `size`, or of any if `None`.
+    /// Lists the units that can join; `selection` lacks sensors of `size`, or of any if `None`.
     pub fn joinable(&self, selection: &[usize], among: &[usize], size: Option<usize>) -> Vec<usize> {
         let room = self.design.count - self.size(selection);
         let cost = self.cost(selection);
@@ -275,20 +255,19 @@ impl Pool {
         among.iter().copied().filter(|unit| fits(unit)).collect()
     }
 
-    /// Whether there is room for a unit. A symmetric layout consists of pairs, and of one sensor in the middle if its count is odd.
+    /// Checks the room: a symmetric layout has pairs, and one middle sensor if its count is odd.
     fn leaves_pairs(&self, room: usize, unit: usize) -> bool {
         let alone = self.units[unit].twin.is_none();
         room >= self.units[unit].size()
             && (self.design.symmetry != Symmetry::Wanted || !alone || !room.is_multiple_of(2))
     }
 
-    /// Whether the budget covers a unit and the cheapest sensors for the remaining room.
+    /// Checks the budget, with the cheapest sensors in the remaining room.
     fn is_affordable(&self, spent: f64, room: usize, unit: usize) -> bool {
         let rest = (room - self.units[unit].size()) as f64 * self.cheapest;
         self.design.affords(spent + self.unit_cost(unit) + rest)
     }
 
-    /// Checks that pairs and middle sensors can give the requested number of sensors.
     fn check_symmetry(&self) -> Result<(), DesignError> {
         if self.design.symmetry != Symmetry::Wanted {
             return Ok(());
@@ -302,12 +281,10 @@ impl Pool {
     }
 }
 
-/// True if a layout may include any two different sensors.
 fn excludes_nothing(design: &SensorDesign) -> bool {
     design.spacing_m == 0.0 && design.symmetry != Symmetry::Forbidden
 }
 
-/// Reason why two different sensors exclude each other; `None` if a layout may include both.
 pub(super) fn exclusion(
     a: &PlacedSensor,
     b: &PlacedSensor,
@@ -332,14 +309,13 @@ pub(super) fn exclusion(
     None
 }
 
-/// Least distance between a sensor and the mirror image of another if symmetry is forbidden: the spacing, or more than half the
-/// distance of sites, so that neighbouring sites are distinguished.
+/// Least distance to a mirror image if forbidden: the spacing, at least half the site spacing.
 fn mirror_distance(design: &SensorDesign, extent: Extent) -> f64 {
     let pitch_m = design.sites.distance_m(extent.length_m()).unwrap_or(0.0);
     design.spacing_m.max(0.5 * pitch_m).max(2e-9 * extent.length_m())
 }
 
-/// Pairs of candidates that mirror each other, and those in the middle alone.
+/// Mirrored pairs, and single candidates in the middle.
 fn mirrored_units(candidates: &Candidates, design: &SensorDesign, extent: Extent) -> Vec<Unit> {
     let twins = candidates.twins(extent);
     let unit = |(first, twin): (usize, &Option<usize>)| match *twin {
@@ -353,7 +329,6 @@ fn mirrored_units(candidates: &Candidates, design: &SensorDesign, extent: Extent
     twins.iter().enumerate().filter_map(unit).collect()
 }
 
-/// The units of the fixed sensors.
 fn fixed_units(
     candidates: &Candidates,
     units: &[Unit],

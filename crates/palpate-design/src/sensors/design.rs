@@ -1,4 +1,4 @@
-//! Task of a sensor design: the sensors on offer, and the constraints.
+//! Task of a sensor design, and its constraints.
 
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
@@ -11,80 +11,80 @@ use crate::contacts::{ContactPrior, check_count, check_positions, spacing};
 use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Cancelled;
 
-/// Default number of candidate sites along a line: every millimetre of the paper's beam.
+/// Default number of sites along a line: every millimetre of the paper's beam.
 const SITES_ALONG_A_LINE: f64 = 400.0;
-/// Default number of candidate sites along the longer side of a plane, where each site needs a solution of the plate.
+/// Default number of sites along a plane's longer side; each needs a solution.
 const SITES_ALONG_A_PLANE: f64 = 30.0;
 /// Default tolerance of the location error, as for the effective length.
 pub(crate) const TOLERANCE_M: f64 = 2e-3;
 
-/// Task of placing sensors: candidate sites, kinds and number, constraints, and the contacts. [`SensorProblem::new`](super::SensorProblem::new) checks it.
+/// Task of placing sensors. [`SensorProblem::new`](super::SensorProblem::new) checks it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorDesign {
-    /// Number of sensors to place, including `must_have`; at least 1.
+    /// Number of sensors, including `must_have`; at least 1.
     pub count: usize,
-    /// The kinds to choose from; at least one.
+    /// Available kinds; at least one.
     pub offers: Vec<SensorOffer>,
-    /// Candidate sites of the sensors.
+    /// Candidate sites.
     pub sites: Sites,
     /// Prior of the contacts.
     pub contacts: ContactPrior,
-    /// Whether the force of the contacts is known to the locator.
+    /// Known if the locator is given the force.
     pub force: Force,
-    /// Criterion by which layouts are compared.
+    /// Criterion of the score.
     pub criterion: DesignCriterion,
-    /// Tolerance of the limit, in metres; greater than 0.
+    /// Tolerance of the limit, m; greater than 0.
     pub tolerance_m: f64,
-    /// Least distance between two sensors, in metres; at least 0. A reaction sensor is part of its support and needs no room.
+    /// Least distance of sensors, m; at least 0. Reaction sensors are exempt.
     pub spacing_m: f64,
-    /// Zones without sensors. Reaction sensors are exempt; they are requested by their kind.
+    /// Zones without sensors. Reaction sensors are exempt.
     pub keep_out: Vec<KeepOut>,
     /// Sensors that every layout has.
     pub must_have: Vec<MustHave>,
-    /// Existing sensors that stay; they are the first of `must_have`.
+    /// Existing sensors that stay; the first of `must_have`.
     pub kept: Vec<Sensor>,
-    /// Largest total cost of the sensors, in the unit of their costs; unlimited if `None`.
+    /// Largest total cost; unlimited if `None`.
     pub budget: Option<f64>,
-    /// Symmetry of the layouts across the middle of the length.
+    /// Symmetry of the layouts.
     pub symmetry: Symmetry,
 }
 
-/// A kind of sensor that is available.
+/// Available kind of sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorOffer {
-    /// Quantity that the sensor measures; never raw.
+    /// Measured quantity; not raw.
     pub kind: SensorKind,
     /// Noise and faults.
     pub channel: ChannelModel,
-    /// Cost of one sensor; at least 0, in any unit.
+    /// Cost of one sensor, in any unit; at least 0.
     pub cost: f64,
-    /// Whether more sensors of this kind are available.
+    /// Supply of this kind.
     pub supply: Supply,
 }
 
-/// Source of the sensors of an offer.
+/// Supply of an offered kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Supply {
-    /// Any number of sensors is available.
+    /// Unlimited.
     #[default]
     Any,
-    /// Only the existing sensors are available.
+    /// Only the existing sensors.
     Kept,
 }
 
 /// Candidate sites.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Sites {
-    /// Sites at 0 and at every multiple of this distance in metres, along each side of the surface; greater than 0.
+    /// Sites at multiples of this distance, m, along each side; greater than 0.
     Every(f64),
-    /// This number of sites, evenly between the ends of a line and not on them.
+    /// Number of even sites between the ends of a line.
     Count(usize),
-    /// The listed sites, each on the surface.
+    /// Listed sites, on the surface.
     At(Vec<Position>),
 }
 
 impl Sites {
-    /// Distance between neighbouring sites along a surface of this length, in metres; `None` for listed sites.
+    /// Spacing along this length, m; `None` for listed sites.
     pub(super) fn distance_m(&self, length_m: f64) -> Option<f64> {
         match self {
             Self::Every(every_m) => Some(*every_m),
@@ -94,7 +94,7 @@ impl Sites {
     }
 }
 
-/// Part of the surface without sensors, its boundary excluded.
+/// Zone without sensors; its boundary is excluded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeepOut {
     /// The left end, or lower left corner.
@@ -104,7 +104,7 @@ pub struct KeepOut {
 }
 
 impl KeepOut {
-    /// Whether a position lies inside the zone, with a margin for rounding errors.
+    /// Returns true inside the zone, with a margin for rounding.
     pub fn holds(&self, position: Position, extent: Extent) -> bool {
         let slack_m = 1e-9 * extent.length_m();
         let inside = |at_m: f64, low_m: f64, high_m: f64| low_m + slack_m < at_m && at_m < high_m - slack_m;
@@ -147,7 +147,7 @@ impl DesignCriterion {
         }
     }
 
-    /// Factor from a score to its displayed unit: limits in millimetres, shares in %.
+    /// Factor from a score to its displayed unit: mm or %.
     pub const fn score_scale(self) -> f64 {
         match self {
             Self::MeanLimit | Self::WorstLimit => 1e3,
@@ -170,11 +170,10 @@ pub enum Symmetry {
 }
 
 impl SensorDesign {
-    /// A design with the number and kinds of a setup's sensors, and with contacts all over its surface. The force is known if the
-    /// setup's force is.
+    /// Creates a design with the sensors of a setup and contacts on its whole surface.
     ///
     /// # Errors
-    /// [`LimitError::NoModel`] where no model explains the sensors.
+    /// [`LimitError::NoModel`] without a model.
     pub fn for_setup(setup: &Setup) -> Result<Self, DesignError> {
         let mut offers: Vec<SensorOffer> = Vec::new();
         for sensor in setup.layout().sensors() {
@@ -204,18 +203,17 @@ impl SensorDesign {
         })
     }
 
-    /// This design with another number of sensors.
+    /// Sets the number of sensors.
     #[must_use]
     pub fn count(self, count: usize) -> Self {
         Self { count, ..self }
     }
 
-    /// This design with every enabled sensor of the existing layout `today` and `count` more. A `must_have` sensor of that layout
-    /// is listed once.
+    /// Keeps the enabled sensors of `today` and adds `count`.
     ///
     /// # Errors
-    /// [`DesignError::KeptDiffers`] if the noise of an existing sensor differs from the offer of its kind, since a layout has one
-    /// channel per kind; [`LimitError::NoModel`] for a raw channel.
+    /// [`DesignError::KeptDiffers`] for a sensor with other noise than its offer; [`LimitError::NoModel`] for
+    /// a raw channel.
     pub fn adding(mut self, count: usize, today: &Layout) -> Result<Self, DesignError> {
         let living = |sensor: &&Sensor| !sensor.channel.dead;
         let mut kept = Vec::new();
@@ -247,46 +245,41 @@ impl SensorDesign {
         Ok(self)
     }
 
-    /// The list of a fixed sensor, by its index in `must_have`.
     pub(super) fn list_of(&self, index: usize) -> FixedList {
         if index < self.kept.len() { FixedList::Kept } else { FixedList::MustHave }
     }
 
-    /// This design with other candidate sites.
+    /// Sets the candidate sites.
     #[must_use]
     pub fn sites(self, sites: Sites) -> Self {
         Self { sites, ..self }
     }
 
-    /// This design for other contacts.
+    /// Sets the contacts.
     #[must_use]
     pub fn contacts(self, contacts: ContactPrior) -> Self {
         Self { contacts, ..self }
     }
 
-    /// This design for contacts of a force that is unknown to the locator.
+    /// Hides the force from the locator.
     #[must_use]
     pub fn unknown_force(self) -> Self {
         Self { force: Force::Unknown, ..self }
     }
 
-    /// Whether costs distinguish layouts: the costs of the offers differ, or a budget limits them.
+    /// Returns true if costs distinguish layouts.
     pub fn has_costs(&self) -> bool {
         self.budget.is_some() || self.offers.windows(2).any(|pair| pair[0].cost != pair[1].cost)
     }
 
-    /// True where no sensor may be placed, except reaction sensors.
     pub(super) fn keeps_out(&self, position: Position, extent: Extent) -> bool {
         self.keep_out.iter().any(|zone| zone.holds(position, extent))
     }
 
-    /// Whether the budget covers a cost, to rounding.
     pub(super) fn affords(&self, cost: f64) -> bool {
         self.budget.is_none_or(|budget| cost <= budget * (1.0 + 1e-12))
     }
 
-    /// Checks every number against its bound and every position against the surface. The contacts are checked in
-    /// `WeightedContacts::from_prior`.
     pub(super) fn check(&self, extent: Extent) -> Result<(), OutOfRange> {
         OutOfRange::check_positive([
             ("the number of sensors", self.count as f64),
@@ -317,19 +310,19 @@ impl SensorDesign {
     }
 }
 
-/// A constraint that cannot be met, or a setup without a possible design.
+/// Reason why no sensors can be placed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DesignError {
-    /// The limit of the setup does not exist.
+    /// The limit does not exist.
     #[error(transparent)]
     Limit(#[from] LimitError),
-    /// The design was stopped.
+    /// Cancelled.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
-    /// A number out of its range.
+    /// Value out of range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
-    /// A number of an offered sensor out of its range.
+    /// Invalid sensor of an offer.
     #[error(transparent)]
     Layout(#[from] LayoutError),
     /// A kind without noise.
@@ -337,7 +330,7 @@ pub enum DesignError {
         "{kind} sensors have no noise and no resolution; one of them must be greater than 0, otherwise the limit is 0 for every layout"
     )]
     SingularNoise {
-        /// Quantity that the sensors measure.
+        /// Measured quantity.
         kind: SensorKind,
     },
     /// All contacts are over supports.
@@ -349,71 +342,71 @@ pub enum DesignError {
     /// Fewer sites than sensors.
     #[error("{count} sensors are requested, but only {sites} sites are available")]
     TooFewSites {
-        /// Requested number of sensors.
+        /// Requested number.
         count: usize,
         /// Available sites.
         sites: usize,
     },
-    /// The spacing leaves no room.
+    /// The spacing leaves too little room.
     #[error(
         "{count} sensors at least {} apart do not fit: {} found place",
         format_length_mm(*spacing_m),
         if *most == 0 { "none".to_owned() } else { format!("at most {most}") }
     )]
     Spacing {
-        /// Requested number of sensors.
+        /// Requested number.
         count: usize,
-        /// Least distance between sensors, in metres.
+        /// Least distance, m.
         spacing_m: f64,
-        /// Largest number that could be placed.
+        /// Largest possible number.
         most: usize,
     },
-    /// Too few sensors can be placed if none may mirror another.
+    /// Too few sites without mirror images.
     #[error("{count} sensors do not fit when none may mirror another: at most {most} found place")]
     NoMirror {
-        /// Requested number of sensors.
+        /// Requested number.
         count: usize,
-        /// Largest number that could be placed.
+        /// Largest possible number.
         most: usize,
     },
-    /// The budget does not suffice.
+    /// Insufficient budget.
     #[error("the budget is {budget}; the cheapest {count} sensors cost {least}")]
     Budget {
-        /// The budget, in the unit of the costs.
+        /// Budget.
         budget: f64,
-        /// Requested number of sensors.
+        /// Requested number.
         count: usize,
-        /// Cost of the cheapest layout found.
+        /// Least cost.
         least: f64,
     },
-    /// `must_have` has more sensors than the layout.
+    /// More fixed sensors than requested.
     #[error("`must_have` lists {listed} sensors{}, but only {count} are requested", if *mirrored { " with their mirror images" } else { "" })]
     TooManyMustHaves {
-        /// Number of listed sensors.
+        /// Listed number.
         listed: usize,
-        /// Requested number of sensors.
+        /// Requested number.
         count: usize,
-        /// True where mirror images are counted too.
+        /// True if mirror images are included.
         mirrored: bool,
     },
-    /// A fixed sensor at a position where it would always read 0.
+    /// An insensitive fixed sensor.
     #[error("the {kind} sensor of {list} at {} would always read 0 there", extent.place_in_words(*position))]
     MustHaveReadsNothing {
-        /// The list that contains it.
+        /// List of the sensor.
         list: FixedList,
-        /// Quantity that the sensor measures.
+        /// Measured quantity.
         kind: SensorKind,
         /// Position.
         position: Position,
         /// The surface.
         extent: Extent,
     },
-    /// A fixed sensor in a zone without sensors.
+    /// A fixed sensor in a `keep_out` zone.
     #[error("the {kind} sensor of {list} at {} lies in a `keep_out` zone", extent.place_in_words(*position))]
     MustHaveKeptOut {
-        /// The list that contains it.
+        /// List of the sensor.
         list: FixedList,
-        /// Quantity that the sensor measures.
+        /// Measured quantity.
         kind: SensorKind,
         /// Position.
         position: Position,
@@ -423,77 +416,77 @@ pub enum DesignError {
     /// Two fixed sensors that exclude each other.
     #[error("the sensors of {list} at {} and {} exclude each other: {}", extent.place_in_words(*first), extent.place_in_words(*second), reason)]
     MustHavesExclude {
-        /// The list that contains them.
+        /// List of the sensors.
         list: FixedList,
-        /// Position of the first sensor.
+        /// First position.
         first: Position,
-        /// Position of the second sensor.
+        /// Second position.
         second: Position,
-        /// Reason for the exclusion.
+        /// Reason.
         reason: Exclusion,
         /// The surface.
         extent: Extent,
     },
-    /// A fixed sensor with a mirror image where no sensor can be.
+    /// A fixed sensor without a possible mirror image.
     #[error("symmetry is requested, but the mirror image of the {kind} sensor of {list} at {} is not a possible position", extent.place_in_words(*position))]
     MustHaveWithoutTwin {
-        /// The list that contains it.
+        /// List of the sensor.
         list: FixedList,
-        /// Quantity that the sensor measures.
+        /// Measured quantity.
         kind: SensorKind,
         /// Position.
         position: Position,
         /// The surface.
         extent: Extent,
     },
-    /// An existing sensor with noise that differs from the offer of its kind.
+    /// An existing sensor with other noise than the offer.
     #[error(
         "sensor {number} of today's layout is a {kind} sensor of another noise, resolution or fault than the {kind} sensors that are offered"
     )]
     KeptDiffers {
-        /// Number of the sensor, from 1.
+        /// Sensor number, from 1.
         number: usize,
-        /// Quantity that the sensor measures.
+        /// Measured quantity.
         kind: SensorKind,
     },
-    /// Too few sites have their mirror image among the sites.
+    /// Too few pairs of mirrored sites.
     #[error(
         "symmetry is requested, but {count} sensors cannot be placed symmetrically: {pairs} pairs of sites mirror each other, {middle} sites lie in the middle"
     )]
     Symmetry {
-        /// Requested number of sensors.
+        /// Requested number.
         count: usize,
         /// Pairs of sites.
         pairs: usize,
         /// Sites in the middle.
         middle: usize,
     },
-    /// A method that gives no layout.
+    /// A method without a layout.
     #[error("the method `{method}` has no layout for these sensors and constraints")]
     NoLayout {
         /// Name of the method.
         method: &'static str,
     },
-    /// More candidates and contacts than fit into memory.
+    /// Insufficient memory.
     #[error("{sites} candidate sites and {contacts} contacts need {:.1} GB; at most {:.1} GB can be used", bytes / 1e9, most / 1e9)]
     TooLarge {
         /// Number of candidates.
         sites: usize,
-        /// Number of contact positions.
+        /// Number of contacts.
         contacts: usize,
-        /// Bytes needed.
+        /// Required bytes.
         bytes: f64,
-        /// Largest number of bytes.
+        /// Available bytes.
         most: f64,
     },
 }
 
-/// A list of sensors that every layout includes.
+/// List of fixed sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FixedList {
-    /// The sensors that the design requests.
+    /// Requested sensors.
     MustHave,
-    /// The existing sensors.
+    /// Existing sensors.
     Kept,
 }
 
@@ -509,18 +502,18 @@ impl std::fmt::Display for FixedList {
 /// Reason why two sensors exclude each other.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Exclusion {
-    /// Both are one sensor.
+    /// Equal sensors.
     #[error("they are the same sensor")]
     Same,
-    /// They are closer to each other than the spacing.
+    /// Closer than the spacing.
     #[error("they are {} apart, and `spacing` is {}", format_length_mm(*distance_m), format_length_mm(*spacing_m))]
     Spacing {
-        /// Distance between them, in metres.
+        /// Distance, m.
         distance_m: f64,
-        /// Least distance, in metres.
+        /// Least distance, m.
         spacing_m: f64,
     },
-    /// One is the mirror image of the other, which is forbidden.
+    /// Forbidden mirror images.
     #[error("they mirror each other, and `symmetry` is forbidden")]
     Mirror,
 }

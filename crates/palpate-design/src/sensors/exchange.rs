@@ -1,13 +1,11 @@
 //! Greedy choice and exchange: the main search.
 //!
-//! Sensors are added one at a time, each the one that improves the score most. Then each in turn is exchanged for the best other
-//! one, until no exchange improves the score (Fedorov 1972 for designs of experiments; greedy choice of sensors by their
-//! information: Krause, Singh and Guestrin, *Journal of Machine Learning Research* 9, 2008). No single exchange improves the
-//! result. Several starts make a better layout elsewhere unlikely.
+//! Greedy choice adds one sensor at a time (Krause, Singh and Guestrin, *Journal of Machine Learning
+//! Research* 9, 2008). Exchanges follow until none improves the score (Fedorov 1972). Several starts make a
+//! local minimum unlikely.
 //!
-//! With very many sites, a coarse sample is searched from all starts, and a finer one from the best of these layouts. Then two
-//! steps alternate. Exchanges among the neighbours of the layout's sites settle it to the exact site; exchanges among all units
-//! find sites that the samples missed. The search ends when the second step gains no significant improvement.
+//! With many sites, a coarse sample is searched from all starts, a finer one from the best. Exchanges among
+//! neighbours and among all units then alternate.
 
 use super::candidates::Pool;
 use super::design::{DesignError, Symmetry};
@@ -15,21 +13,19 @@ use super::objective::{Block, ForceBelief, Objective, State};
 use palpate_numerics::random_order;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// With more units than this, searches begin in samples of them: coarse samples for every start, this size for the best.
+/// With more units, searches begin in samples: of this size for the best layout, coarse for every start.
 const SAMPLE: usize = 2000;
 const COARSE_SAMPLE: usize = 250;
-/// Number of random layouts from which the exchange starts, besides the others.
+/// Number of random starts.
 const RANDOM_STARTS: u64 = 6;
-/// An exchange must improve the score by more than this share of it.
+/// Least relative gain of an exchange.
 const LEAST_GAIN: f64 = 1e-10;
-/// Least gain of an exchange with very many sites: a millionth of a limit of 2 mm is 2 nm, far below any drilling tolerance.
+/// Least relative gain with many sites: 2 nm of a limit of 2 mm, far below any drilling tolerance.
 const LEAST_GAIN_OF_MANY: f64 = 1e-6;
-/// Units that are evaluated for every slot while their rows are in the processor's nearer caches.
+/// Units per block, with rows in the nearer caches.
 const CHUNK: usize = 64;
-/// Limit of the rounds of exchange, far above that of any search.
 const MOST_ROUNDS: usize = 100;
 
-/// A layout and its score.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Found {
     pub selection: Vec<usize>,
@@ -37,13 +33,11 @@ pub(super) struct Found {
 }
 
 impl Found {
-    /// The better of the two.
     pub fn or_better(self, other: Self) -> Self {
         if other.score < self.score { other } else { self }
     }
 }
 
-/// A search for layouts: the units to choose from, the criterion, and the watch.
 #[derive(Clone, Copy)]
 pub(super) struct Search<'a> {
     pub pool: &'a Pool,
@@ -51,7 +45,6 @@ pub(super) struct Search<'a> {
     pub watch: Watch<'a>,
 }
 
-/// A layout without one of its units.
 struct Without {
     leaving: usize,
     others: Vec<usize>,
@@ -59,20 +52,18 @@ struct Without {
 }
 
 impl Search<'_> {
-    /// A layout with its score.
     pub fn scored(&self, selection: Vec<usize>) -> Found {
         let state = self.state(&selection, ForceBelief::Vague);
         Found { score: self.objective.score(&state), selection }
     }
 
-    /// The state with the sensors of a selection.
     pub fn state(&self, selection: &[usize], belief: ForceBelief) -> State {
         let candidates = self.pool.candidates(selection);
         let rows: Vec<&[Block]> = candidates.iter().map(|candidate| self.objective.row(*candidate)).collect();
         self.objective.state(&rows, belief)
     }
 
-    /// The best layout of several starts; `feasible` meets all constraints.
+    /// Best layout of several starts; `feasible` meets all constraints.
     pub fn greedy_exchange(&self, feasible: &[usize], seed: u64) -> Result<Found, Cancelled> {
         if self.pool.units.len() <= SAMPLE {
             return self.best_of_starts(&self.pool.all(), feasible, seed);
@@ -84,7 +75,6 @@ impl Search<'_> {
         self.exchange_among_many(found)
     }
 
-    /// The best layout of several starts.
     fn best_of_starts(&self, among: &[usize], feasible: &[usize], seed: u64) -> Result<Found, Cancelled> {
         let starts = [self.greedy(among), even_start(self.pool, among), Some(feasible.to_vec())];
         let random = (0..RANDOM_STARTS).map(|k| random_start(self.pool, among, seed.wrapping_add(k)));
@@ -98,7 +88,7 @@ impl Search<'_> {
         Ok(best)
     }
 
-    /// Exchanges units for neighbours until the score stays, then for any others, until no exchange gains enough.
+    /// Alternates exchanges with neighbours and with all units.
     fn exchange_among_many(&self, mut found: Found) -> Result<Found, Cancelled> {
         for _ in 0..MOST_ROUNDS {
             for _ in 0..MOST_ROUNDS {
@@ -120,8 +110,8 @@ impl Search<'_> {
         Ok(found)
     }
 
-    /// The best exchange of the unit in each slot that may change, the slot with the greatest gain first. One pass over all units
-    /// serves all slots, since fetching so many rows takes about as long as evaluating one.
+    /// Finds the best exchange of each slot, best first. One pass serves all slots: fetching rows takes as
+    /// long as evaluation.
     fn best_of_each_slot(&self, found: &Found) -> Result<Vec<(usize, usize)>, Cancelled> {
         let slots: Vec<usize> = (self.pool.fixed.len()..found.selection.len()).collect();
         let without: Vec<Without> = slots.iter().map(|slot| self.without(found, *slot)).collect();
@@ -141,7 +131,6 @@ impl Search<'_> {
         Ok(bests.into_iter().map(|(slot, (unit, _))| (slot, unit)).collect())
     }
 
-    /// The layout built up by the best unit at a time; `None` if no unit can join.
     pub fn greedy(&self, among: &[usize]) -> Option<Vec<usize>> {
         let mut selection = self.pool.fixed.clone();
         while !self.pool.is_whole(&selection) {
@@ -155,7 +144,6 @@ impl Search<'_> {
         Some(selection)
     }
 
-    /// Exchanges one unit after the other for the best, until the score stays.
     pub fn exchange(&self, among: &[usize], selection: Vec<usize>) -> Result<Found, Cancelled> {
         let mut found = self.scored(selection);
         let fixed = self.pool.fixed.len();
@@ -173,7 +161,7 @@ impl Search<'_> {
         Ok(found)
     }
 
-    /// Exchanges the unit in one slot for the best of its size, if that improves the score by more than this share of it.
+    /// Exchanges a unit for the best of equal size, if the relative gain exceeds `least_gain`.
     fn exchange_one(&self, among: &[usize], found: &mut Found, slot: usize, least_gain: f64) -> bool {
         let without = self.without(found, slot);
         let Some((unit, score)) = self.best_to_fill(&without, among) else { return false };
@@ -185,20 +173,18 @@ impl Search<'_> {
         improves
     }
 
-    /// The layout without the unit in one slot.
     fn without(&self, found: &Found, slot: usize) -> Without {
         let mut others = found.selection.clone();
         let leaving = others.remove(slot);
         Without { leaving, state: self.state(&others, ForceBelief::Vague), others }
     }
 
-    /// The best unit to fill the gap, of the size of the removed one.
     fn best_to_fill(&self, without: &Without, among: &[usize]) -> Option<(usize, f64)> {
         let size = self.pool.units[without.leaving].size();
         self.best_of(&without.state, &self.pool.joinable(&without.others, among, Some(size)))
     }
 
-    /// The unit with the best score when added, the first of equals.
+    /// Unit with the best score when added, the first of equals.
     fn best_of(&self, state: &State, units: &[usize]) -> Option<(usize, f64)> {
         let mut best: Option<(usize, f64)> = None;
         for unit in units {
@@ -210,7 +196,6 @@ impl Search<'_> {
         best
     }
 
-    /// The score with one more unit.
     pub fn score_with(&self, state: &State, unit: usize) -> f64 {
         let unit = self.pool.units[unit];
         match unit.twin {
@@ -223,7 +208,7 @@ impl Search<'_> {
     }
 }
 
-/// The units within one step of the sample around the units of a layout.
+/// Units within one step of the sample around a layout.
 fn nearby(pool: &Pool, layout: &[usize]) -> Vec<usize> {
     let count = pool.units.len();
     let step = count.div_ceil(SAMPLE);
@@ -234,7 +219,7 @@ fn nearby(pool: &Pool, layout: &[usize]) -> Vec<usize> {
     nearby
 }
 
-/// About `size` units, evenly from all of them, and those of a layout.
+/// Samples about `size` units evenly, and a layout.
 fn sample(pool: &Pool, size: usize, layout: &[usize]) -> Vec<usize> {
     let count = pool.units.len();
     let mut sample: Vec<usize> = (0..count).step_by(count.div_ceil(size)).collect();
@@ -244,7 +229,7 @@ fn sample(pool: &Pool, size: usize, layout: &[usize]) -> Vec<usize> {
     sample
 }
 
-/// A layout filled from the left, the cheapest kinds first.
+/// Fills a layout from the left, the cheapest kinds first.
 ///
 /// # Errors
 /// The constraint that leaves too few sensors.
@@ -257,7 +242,6 @@ pub(super) fn feasible(pool: &Pool) -> Result<Vec<usize>, DesignError> {
     if pool.is_whole(&selection) { Ok(selection) } else { Err(why_not(pool, &order)) }
 }
 
-/// Adds units in this order, each if it may join.
 fn joined(pool: &Pool, order: &[usize]) -> Vec<usize> {
     let mut selection = pool.fixed.clone();
     for unit in order {
@@ -271,7 +255,7 @@ fn joined(pool: &Pool, order: &[usize]) -> Vec<usize> {
     selection
 }
 
-/// The constraint that excludes such a layout: the budget, if a layout exists without it.
+/// Unmet constraint: the budget, if a layout exists without it.
 fn why_not(pool: &Pool, order: &[usize]) -> DesignError {
     let count = pool.design.count;
     let mut most = pool.fixed.clone();
@@ -291,7 +275,6 @@ fn why_not(pool: &Pool, order: &[usize]) -> DesignError {
     }
 }
 
-/// A layout as even along the surface as the sites and constraints allow; `None` if no unit can join.
 fn even_start(pool: &Pool, among: &[usize]) -> Option<Vec<usize>> {
     let mut selection = pool.fixed.clone();
     let place = |unit: usize| pool.sensors[pool.units[unit].first].position;
@@ -316,7 +299,6 @@ fn even_start(pool: &Pool, among: &[usize]) -> Option<Vec<usize>> {
     pool.is_whole(&selection).then_some(selection)
 }
 
-/// A random layout; `None` if no unit can join.
 pub(super) fn random_start(pool: &Pool, among: &[usize], seed: u64) -> Option<Vec<usize>> {
     let order: Vec<usize> = random_order(among.len(), seed).into_iter().map(|i| among[i]).collect();
     let selection = joined(pool, &order);

@@ -1,20 +1,18 @@
-//! Search of all layouts, if they are few.
+//! Exhaustive search of few layouts.
 
 use super::candidates::Pool;
 use super::exchange::{Found, Search};
 use super::objective::ForceBelief;
 use palpate_numerics::watch::Cancelled;
 
-/// Largest number of layouts that is searched.
 pub(super) const MOST_LAYOUTS: f64 = 300_000.0;
 
-/// Upper bound of the number of layouts: the ways to choose `slots` units.
+/// Upper bound of the number of layouts.
 pub(super) fn layouts(pool: &Pool, slots: usize) -> f64 {
     let free = pool.units.len() - pool.fixed.len();
     (0..slots).map(|i| (free as f64 - i as f64) / (i as f64 + 1.0)).product::<f64>().max(0.0)
 }
 
-/// The best of all layouts of `slots` free units; `None` if there is none.
 pub(super) fn search(search: &Search, slots: usize) -> Result<Option<Found>, Cancelled> {
     let selection = search.pool.fixed.clone();
     if slots == 0 {
@@ -25,7 +23,6 @@ pub(super) fn search(search: &Search, slots: usize) -> Result<Option<Found>, Can
     Ok(enumeration.best)
 }
 
-/// State of the enumeration of layouts.
 struct Enumeration<'a> {
     search: &'a Search<'a>,
     slots: usize,
@@ -34,7 +31,6 @@ struct Enumeration<'a> {
 }
 
 impl Enumeration<'_> {
-    /// Enumerates the units from `first` on for the next slot.
     fn fill_slot(&mut self, first: usize) -> Result<(), Cancelled> {
         let chosen = self.selection.len() - self.search.pool.fixed.len();
         let count = self.search.pool.units.len();
@@ -55,7 +51,6 @@ impl Enumeration<'_> {
         Ok(())
     }
 
-    /// The last slot: evaluates every unit that completes the layout.
     fn judge(&mut self, units: &[usize]) {
         let room = self.search.pool.design.count - self.search.pool.size(&self.selection);
         let state = self.search.state(&self.selection, ForceBelief::Vague);

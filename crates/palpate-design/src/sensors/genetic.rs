@@ -1,8 +1,7 @@
-//! A genetic search, after Elliott et al., who chose the sensing positions of a plate with it.
+//! Genetic search, after Elliott et al.
 //!
-//! A layout is a set of units. Two parents, each the best of a few drawn at random, have a child. It takes its units from both in
-//! random order as far as the constraints allow; at random a unit is exchanged for any other. The best layouts of a generation
-//! survive.
+//! Parents from tournaments have a child with units of both, as far as the constraints allow. A mutation
+//! exchanges a unit. The best layouts survive.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -11,18 +10,16 @@ use super::candidates::Pool;
 use super::exchange::{Found, Search, random_start};
 use palpate_numerics::watch::Cancelled;
 
-/// Name of the search in progress messages.
 pub(super) const STAGE: &str = "genetic search";
 const POPULATION: usize = 60;
 const GENERATIONS: usize = 120;
-/// Layouts that survive unchanged.
+/// Number of layouts that survive unchanged.
 const ELITE: usize = 4;
-/// Layouts in a draw; the best of them becomes a parent.
+/// Number of layouts in a tournament.
 const TOURNAMENT: usize = 3;
-/// Probability that a child exchanges one of its units for any other.
+/// Probability of a mutation.
 const MUTATION: f64 = 0.4;
 
-/// The best layout after a fixed number of generations; `feasible` meets all constraints.
 pub(super) fn search(search: &Search, feasible: &[usize], seed: u64) -> Result<Found, Cancelled> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let (pool, all) = (search.pool, search.pool.all());

@@ -1,18 +1,13 @@
-//! The limit as a criterion. A few numbers per contact describe the covariance that the chosen sensors leave, and one more sensor
-//! changes them by a rank-1 term.
+//! The limit as a criterion, with one more sensor as a rank-1 update.
 //!
-//! At a contact the P unknowns are θ = (ln W, x, y), without a known force W and without y on a line. A sensor with derivatives
-//! j = ∂y/∂θ / σ adds j·jᵀ to the information (see [`palpate_mechanics::limit`]). A prior states that the contact is on the surface,
-//! with the variance l²/12 of a flat prior along each side. The prior of the force is nearly uninformative (a standard deviation of
-//! 1000 times its value). So the covariance C = (prior + Σ j·jᵀ)⁻¹ exists for every layout. Along a line its entry of the position
-//! is 1/(1/s² + 12/l²), where s is the limit: never above the prior's variance, even if the layout does not determine the position.
-//! One more sensor changes it to
+//! A contact has P unknowns θ = (ln W, x, y), without a known force W and without y on a line. A sensor with
+//! derivatives j = ∂y/∂θ / σ adds j·jᵀ to the information (see [`palpate_mechanics::limit`]). Priors are the
+//! flat one of the surface, with variance l²/12 along each side, and a nearly uninformative one of the force.
+//! So the covariance C = (prior + Σ j·jᵀ)⁻¹ exists for every layout. One more sensor changes it to
 //!
 //! ```text
 //! C − (C·j)·(C·j)ᵀ / (1 + jᵀ·C·j)        (Sherman and Morrison)
 //! ```
-//!
-//! For P ≤ 3 this takes about twenty multiplications per contact, so one pass over their rows evaluates all candidates.
 
 mod sums;
 
@@ -23,31 +18,28 @@ use super::objective::{Block, ForceBelief, LANES, Objective, State};
 use palpate_numerics::small::{Ldl, add_outer};
 use sums::{Contacts, Mean, Shrinking, Sums, Without, Worst, folded};
 
-/// Prior information on ln W: for a standard deviation of 1000 times the force, and of 1 time.
+/// Prior information on ln W: a standard deviation of 1000 times the force, and of 1 time.
 const VAGUE: f64 = 1e-6;
 const ROUGH: f64 = 1.0;
-/// Weight of the mean limit, as a share of the criterion's size. It decides between layouts with equal criteria.
+/// Weight of the mean limit relative to the criterion, to break ties.
 const TIE_BREAK: f64 = 1e-3;
 
-/// Rows of all candidates, and the criterion.
 pub(super) struct LimitObjective<const P: usize, const FIRST: usize> {
     /// [candidate][unknown][block of contacts]
     table: Arc<Vec<Block>>,
-    /// Number of blocks of contacts.
     blocks: usize,
     weights: Vec<Block>,
-    /// 12/l² of each side, 0 for the force, which has one of two priors.
+    /// 12/l² of each side; 0 for the force, which has one of two priors.
     prior: [f64; P],
     criterion: DesignCriterion,
-    /// The variance at the tolerance.
+    /// Variance at the tolerance.
     good_enough: f64,
     /// Prior standard deviation of the position.
     unknown_m: f64,
 }
 
 impl<const P: usize, const FIRST: usize> LimitObjective<P, FIRST> {
-    /// `table` has one row of P·⌈contacts/8⌉ blocks per candidate. `sides_m` has one side of the surface for each unknown of the
-    /// position.
+    /// `table`: per candidate P·⌈contacts/8⌉ blocks; `sides_m`: one side per unknown of the position.
     pub fn new(
         table: Arc<Vec<Block>>,
         weights: &[f64],
@@ -70,12 +62,10 @@ impl<const P: usize, const FIRST: usize> LimitObjective<P, FIRST> {
         }
     }
 
-    /// See [`folded`].
     fn folded<S: Sums>(&self, state: &State, row: &[Block], sums: &S) -> [f64; 2] {
         folded::<P, FIRST, S>(Contacts { covariances: &state.values, row, weights: &self.weights }, sums)
     }
 
-    /// The sums for a sensor, or for none.
     fn sums(&self, state: &State, row: &[Block]) -> [f64; 2] {
         match self.criterion {
             DesignCriterion::MeanLimit => self.folded(state, row, &Mean),
@@ -92,7 +82,6 @@ impl<const P: usize, const FIRST: usize> LimitObjective<P, FIRST> {
         vec![[0.0; LANES]; P * self.blocks]
     }
 
-    /// The score from its sums.
     fn search_score(&self, [sum, mean_m]: [f64; 2]) -> f64 {
         match self.criterion {
             DesignCriterion::MeanLimit | DesignCriterion::DOptimality => sum,
@@ -182,12 +171,11 @@ impl<const P: usize, const FIRST: usize> Objective for LimitObjective<P, FIRST> 
     }
 }
 
-/// Index of entry (i, k) of a symmetric matrix in its lower triangle, row by row.
+/// Index of entry (i, k) in the lower triangle, row by row.
 const fn packed(i: usize, k: usize) -> usize {
     if i >= k { i * (i + 1) / 2 + k } else { k * (k + 1) / 2 + i }
 }
 
-/// The values in blocks, the last one filled up with zeros.
 pub(super) fn padded(values: &[f64]) -> Vec<Block> {
     let block = |values: &[f64]| std::array::from_fn(|lane| values.get(lane).copied().unwrap_or(0.0));
     values.chunks(LANES).map(block).collect()

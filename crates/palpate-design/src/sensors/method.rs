@@ -1,4 +1,4 @@
-//! Methods that make layouts, and the layouts of each.
+//! Methods of sensor placement.
 
 use std::sync::Arc;
 
@@ -57,7 +57,7 @@ impl Method {
         }
     }
 
-    /// The reference layout of comparisons, in words: "the even layout's".
+    /// Reference layout in words: "the even layout's".
     pub const fn reference_in_words(self) -> &'static str {
         match self {
             Self::Existing => "today's",
@@ -65,41 +65,40 @@ impl Method {
         }
     }
 
-    /// Whether the method searches by the design's criterion, so that its best layout is the design.
+    /// Returns true if the method searches by the criterion.
     pub const fn is_search(self) -> bool {
         matches!(self, Self::GreedyExchange | Self::Exhaustive | Self::Genetic | Self::Refined)
     }
 }
 
-/// A layout and its assessment.
+/// Layout and its assessment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Designed {
-    /// Method that placed the sensors.
+    /// Method of placement.
     pub method: Method,
-    /// The sensors, kind by kind in the order of the offers, from left to right.
+    /// Sensors by kind in the order of the offers, left to right.
     pub layout: Layout,
     /// Figures of merit.
     pub assessment: Assessment,
 }
 
-/// The best layout of the searches by the criterion.
+/// Returns the search result with the best score.
 pub fn best_design(designed: &[Designed]) -> Option<&Designed> {
     let searched = designed.iter().filter(|designed| designed.method.is_search());
     searched.min_by(|a, b| a.assessment.score.total_cmp(&b.assessment.score))
 }
 
-/// Layouts to verify by simulated calibrations: those that the design is compared with, and the best of the searches by the
-/// criterion, as several may have found one layout.
+/// Selects the layouts to verify: references, and the best search result.
 pub fn to_verify(designed: &[Designed]) -> impl Iterator<Item = &Designed> {
     let best = best_design(designed).map(|best| best.method);
     designed.iter().filter(move |designed| !designed.method.is_search() || Some(designed.method) == best)
 }
 
 impl SensorProblem<'_> {
-    /// All layouts: even, the setup's own, of all suitable searches, and of the historical methods.
+    /// Computes the layouts of all suitable methods.
     ///
     /// # Errors
-    /// As [`SensorProblem::assess`], or when the watch stopped it.
+    /// As [`SensorProblem::assess`], or if cancelled.
     pub fn all(&self, seed: u64, watch: Watch) -> Result<Vec<Designed>, DesignError> {
         let even = self.even_if_any()?;
         let is_even = |existing: &Designed| {
@@ -126,11 +125,10 @@ impl SensorProblem<'_> {
         Ok(designed)
     }
 
-    /// The layout of one method. Refinement starts from the better layout of exchange and genetic search.
+    /// Computes the layout of one method; refinement starts from exchange or genetic search.
     ///
     /// # Errors
-    /// As [`SensorProblem::all`], and [`DesignError::NoLayout`] if the method has no layout: an even layout of reaction sensors, or
-    /// a QR layout that the constraints exclude.
+    /// As [`SensorProblem::all`], and [`DesignError::NoLayout`].
     pub fn by_method(&self, method: Method, seed: u64, watch: Watch) -> Result<Designed, DesignError> {
         let none = || DesignError::NoLayout { method: method.name() };
         let found = match method {
@@ -159,7 +157,7 @@ impl SensorProblem<'_> {
         self.designed(method, &found.selection)
     }
 
-    /// The layout by greedy choice and exchange, by far the fastest search and nearly always the best.
+    /// Computes the layout by greedy choice and exchange, the fastest search.
     ///
     /// # Errors
     /// As [`SensorProblem::all`].
@@ -167,16 +165,14 @@ impl SensorProblem<'_> {
         self.by_method(Method::GreedyExchange, seed, watch)
     }
 
-    /// The even layout, of the first kind that is not tied to supports: at i·l/(k+1), on a plane the grid with cells closest to
-    /// squares.
+    /// Computes the even layout of a kind that is not tied to supports: i·l/(k+1), on a plane a grid.
     ///
     /// # Errors
-    /// As [`SensorProblem::assess`], and [`DesignError::NoLayout`] where only reactions are offered.
+    /// As [`SensorProblem::assess`], and [`DesignError::NoLayout`] if only reactions are offered.
     pub fn even(&self) -> Result<Designed, DesignError> {
         self.even_if_any()?.ok_or(DesignError::NoLayout { method: Method::Even.name() })
     }
 
-    /// The even layout, if one kind is not tied to supports.
     pub(super) fn even_if_any(&self) -> Result<Option<Designed>, DesignError> {
         let design = &self.pool.design;
         let is_free = |offer: &SensorOffer| offer.kind != SensorKind::Reaction && offer.supply == Supply::Any;
@@ -194,8 +190,7 @@ impl SensorProblem<'_> {
         self.judged(Method::Even, sensors).map(Some)
     }
 
-    /// A sensor of a layout. If it would always read 0, as on a support, it moves to the nearest candidate that no other sensor
-    /// occupies, the first of two as near. `None` if there is none.
+    /// Returns a sensor, or the nearest free candidate if it always reads 0.
     fn nearest_that_reads(&self, sensors: &[PlacedSensor], which: usize) -> Option<PlacedSensor> {
         let sensor = sensors[which];
         let kind = self.pool.design.offers[sensor.offer].kind;
@@ -222,7 +217,6 @@ impl SensorProblem<'_> {
         Ok(Designed { method: Method::Existing, layout, assessment })
     }
 
-    /// The search by the design's criterion.
     pub(super) fn search<'s>(&'s self, watch: Watch<'s>) -> Search<'s> {
         Search { pool: &self.pool, objective: &*self.objective, watch }
     }
@@ -231,12 +225,10 @@ impl SensorProblem<'_> {
         genetic::search(&self.search(watch), &self.feasible, seed)
     }
 
-    /// Number of units of a layout that the search chooses.
     fn free_slots(&self) -> usize {
         self.feasible.len() - self.pool.fixed.len()
     }
 
-    /// Layouts by published criteria.
     fn historical(&self, seed: u64, watch: Watch) -> Result<Vec<Designed>, DesignError> {
         let design = &self.pool.design;
         let mut designed = Vec::new();
@@ -274,7 +266,7 @@ impl SensorProblem<'_> {
         Ok(Designed { method, layout, assessment })
     }
 
-    /// Layout of some sensors: first the existing ones if they are kept, then kind by kind, from left to right.
+    /// Builds a layout: kept sensors first, then by kind, left to right.
     fn layout(&self, mut placed: Vec<PlacedSensor>) -> Result<Layout, DesignError> {
         placed.sort_by(|a, b| {
             let by_offer = a.offer.cmp(&b.offer);
@@ -294,7 +286,7 @@ impl SensorProblem<'_> {
         Ok(Layout::new(sensors)?)
     }
 
-    /// The existing sensors, if all of them are placed. They are removed from `placed`.
+    /// Removes the kept sensors from `placed`, if all are placed.
     fn kept_among(&self, placed: &mut Vec<PlacedSensor>) -> Vec<Sensor> {
         let design = &self.pool.design;
         let is_kept = |sensor: &PlacedSensor, wanted: &MustHave| {
@@ -309,13 +301,13 @@ impl SensorProblem<'_> {
         design.kept.clone()
     }
 
-    /// Whether a sensor is an existing one that the design keeps.
+    /// Returns true for a kept sensor.
     pub fn is_kept(&self, sensor: &Sensor) -> bool {
         let kept = &self.pool.design.kept;
         kept.iter().any(|kept| kept.kind == sensor.kind && kept.position == sensor.position)
     }
 
-    /// Positions of the sensors of a layout, in words; if existing sensors are kept, the new ones separately.
+    /// Describes positions in words, new sensors apart from kept ones.
     pub fn places_in_words(&self, layout: &Layout) -> String {
         let words = |new: bool| {
             let sensors = layout.sensors().iter().filter(|sensor| self.is_kept(sensor) != new);
@@ -331,14 +323,14 @@ impl SensorProblem<'_> {
         }
     }
 
-    /// The reference layout: the existing one if it is kept, else the even one.
+    /// Returns the existing layout if it is kept, else the even one.
     pub fn reference<'d>(&self, designed: &'d [Designed]) -> Option<&'d Designed> {
         let method = if self.pool.design.kept.is_empty() { Method::Even } else { Method::Existing };
         designed.iter().find(|designed| designed.method == method)
     }
 }
 
-/// i·l/(k+1) on a line; on a plane the inner crossings of the grid with cells closest to squares.
+/// Even positions: i·l/(k+1), on a plane inner crossings of a grid.
 fn even_positions(count: usize, extent: Extent) -> Vec<Position> {
     if let Extent::Line { .. } = extent {
         return sensing::even_positions(count, extent.length_m()).collect();

@@ -1,4 +1,4 @@
-//! Placement of sensors: k of many candidate sites, of several kinds, for the expected contacts.
+//! Placement of sensors: k of many candidate sites, of several kinds.
 //!
 //! ```
 //! use palpate_design::sensors::{ContactPrior, SensorDesign, SensorProblem, Sites};
@@ -18,15 +18,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! A layout is judged by the limit (see [`palpate_mechanics::limit`]) over those contacts, by one of four criteria
-//! ([`DesignCriterion`]). Searches build layouts that meet every constraint of a [`SensorDesign`]; a [`DesignError`] names a
-//! constraint that cannot be met. Layouts by the historical methods and the even layout are compared with them.
+//! A [`DesignCriterion`] scores layouts by the limit (see [`palpate_mechanics::limit`]). Searches meet every
+//! constraint of a [`SensorDesign`].
 //!
-//! With an unknown force, no layout can locate a contact over a support, so these contacts are excluded. At any other contact that
-//! the readings do not determine there is no limit, and a mean would not exist. Criteria therefore include the prior information
-//! that the contact lies on the surface: a flat prior of variance l²/12. Along a line the score of a contact is then
-//! 1/√(1/s² + 12/l²), with s the limit. The mean, the largest limit and the share within a tolerance in an [`Assessment`] are
-//! those of the limit itself.
+//! Contacts over a support are excluded if the force is unknown. Criteria include the flat prior of the
+//! surface: along a line the score of a contact is 1/√(1/s² + 12/l²), with the limit s. An [`Assessment`]
+//! gives the limits themselves.
 
 mod assessment;
 mod candidates;
@@ -64,7 +61,7 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::Watch;
 use sensitivity::{Sensitivity, SensorAt};
 
-/// A prepared design: the sensitivity of every candidate to every contact, and a layout that meets all constraints.
+/// Prepared design with sensitivities and a feasible layout.
 pub struct SensorProblem<'a> {
     setup: &'a Setup,
     sensitivity: Sensitivity<'a>,
@@ -72,35 +69,33 @@ pub struct SensorProblem<'a> {
     table: Arc<Vec<Block>>,
     pool: Pool,
     objective: Box<dyn Objective + 'a>,
-    /// A layout that meets all constraints.
     feasible: Vec<usize>,
 }
 
 impl<'a> SensorProblem<'a> {
-    /// Prepares a design for a setup. The setup's own layout is used only by [`Method::Existing`].
+    /// Prepares a design.
     ///
-    /// On a plate with more candidates than three times the contacts, the model is solved for the contacts. By reciprocity three
-    /// solutions per contact give the readings of all sensors there and their derivatives.
+    /// A plate with more candidates than three times the contacts is solved by reciprocity: three solutions
+    /// per contact give all readings and derivatives.
     ///
     /// # Errors
-    /// [`DesignError`] with the constraint that no layout can meet, with the number that is out of range, or when the watch stopped
-    /// it.
+    /// [`DesignError`] with the unmet constraint, or if cancelled.
     pub fn new(setup: &'a Setup, design: &SensorDesign, watch: Watch) -> Result<Self, DesignError> {
         let (sensitivity, candidates) = checked(setup, design)?;
         let table = sensitivity.table(&SensorAt::of_design(&candidates.sensors, design), watch)?;
         Self::with_table(setup, sensitivity, candidates, Arc::new(table), design)
     }
 
-    /// Work and memory of [`SensorProblem::new`] and [`SensorProblem::all`], estimated without solving the model.
+    /// Estimates work and memory of [`SensorProblem::new`] and [`SensorProblem::all`].
     ///
     /// # Errors
-    /// [`DesignError`] for a number out of its range, or a constraint on candidates that contradicts the surface.
+    /// [`DesignError`] for an invalid design.
     pub fn estimated_cost(setup: &'a Setup, design: &SensorDesign) -> Result<DesignCost, DesignError> {
         let (sensitivity, candidates) = checked(setup, design)?;
         Ok(sensitivity.cost(candidates.sensors.len(), design.count))
     }
 
-    /// This problem with another number of sensors.
+    /// Returns this problem with another number of sensors.
     ///
     /// # Errors
     /// As [`SensorProblem::new`].
@@ -123,28 +118,28 @@ impl<'a> SensorProblem<'a> {
         Ok(Self { setup, sensitivity, candidates, table, pool, objective, feasible })
     }
 
-    /// The design task.
+    /// Design task.
     pub fn design(&self) -> &SensorDesign {
         &self.pool.design
     }
 
-    /// Contacts for which the layout is designed.
+    /// Contacts of the design.
     pub fn contacts(&self) -> &WeightedContacts {
         &self.sensitivity.contacts
     }
 
-    /// Positions of contacts over supports, where no layout determines an unknown force. Searches and assessments exclude them.
+    /// Lists the excluded contacts over supports.
     pub fn contacts_over_supports(&self) -> Vec<Position> {
         let positions = self.sensitivity.contacts.positions.iter().copied();
         positions.filter(|position| !self.sensitivity.is_judged(*position)).collect()
     }
 
-    /// Whether the locator is given the force of the contacts.
+    /// Known if the locator is given the force.
     pub fn force(&self) -> Force {
         self.sensitivity.force
     }
 
-    /// Force of the contacts, in newtons.
+    /// Force of the contacts, N.
     pub fn force_n(&self) -> f64 {
         self.sensitivity.force_n
     }
@@ -159,13 +154,11 @@ impl<'a> SensorProblem<'a> {
         self.pool.sensors.len()
     }
 
-    /// The sensitivities of some sensors to the contacts.
     fn rows(&self, sensors: &[PlacedSensor]) -> Vec<Vec<Block>> {
         self.sensitivity.rows(&SensorAt::of_design(sensors, &self.pool.design))
     }
 }
 
-/// The contacts and candidates of a design, after its numbers are checked against their ranges.
 fn checked<'a>(
     setup: &'a Setup,
     design: &SensorDesign,

@@ -1,9 +1,9 @@
-//! Sites by QR factorisation with column pivoting, as PySensors chooses them.
+//! Sites by QR factorization with column pivoting, as in PySensors.
 //!
-//! The matrix has one column per site and one row per mode. Each step chooses the column farthest from the span of the chosen ones
-//! (Businger and Golub, *Numerische Mathematik* 7, 1965; for sensors Manohar, Brunton, Kutz and Brunton, *IEEE Control Systems* 38,
-//! 2018). With q the unit vector of the new part of that column, the distance² of every column falls by (q·column)². As q is
-//! orthogonal to all earlier ones, the columns themselves stay unchanged, and a step costs one product.
+//! Each step chooses the column (site) farthest from the span of the chosen ones (Businger and Golub,
+//! *Numerische Mathematik* 7, 1965; Manohar, Brunton, Kutz and Brunton, *IEEE Control Systems* 38, 2018).
+//! With q the unit vector of its new part, the distance² of every column falls by (q·column)²; q is
+//! orthogonal to all earlier ones, so columns stay unchanged.
 
 use ndarray::Array2;
 
@@ -11,12 +11,11 @@ use super::candidates::Pool;
 use palpate_numerics::small::{add_multiple, dot};
 use palpate_numerics::symmetric_eigen;
 
-/// Columns that are processed together, so that their distances stay in the nearest cache.
+/// Columns per block; their distances stay in the nearest cache.
 const BLOCK: usize = 1024;
-/// A column with a smaller distance than this share of the longest lies in the span of the chosen ones.
+/// Least relative squared distance outside the span.
 const NOTHING_NEW: f64 = 1e-20;
 
-/// Columns of a matrix, and their distances from the span of the chosen ones.
 struct Pivoting<'a> {
     /// One row per mode.
     modes: &'a [Vec<f64>],
@@ -34,13 +33,11 @@ impl<'a> Pivoting<'a> {
         Self { modes, left, span: Vec::new(), longest }
     }
 
-    /// Whether all columns lie in the span.
     fn is_exhausted(&self) -> bool {
         self.span.len() == self.modes.len()
             || self.left.iter().all(|left| *left <= NOTHING_NEW * self.longest)
     }
 
-    /// Resets the state, as for the first column.
     fn restart(&mut self) {
         self.left = squares(self.modes);
         self.span.clear();
@@ -82,7 +79,7 @@ fn squares(modes: &[Vec<f64>]) -> Vec<f64> {
     squares
 }
 
-/// The first `count` pivots of the matrix with these rows, at most one per row; the first of equals.
+/// Returns the first `count` pivots, at most one per row; the first of equals.
 pub fn pivoted_columns(modes: &[Vec<f64>], count: usize) -> Vec<usize> {
     let mut pivoting = Pivoting::new(modes);
     let mut pivots = Vec::new();
@@ -98,8 +95,8 @@ pub fn pivoted_columns(modes: &[Vec<f64>], count: usize) -> Vec<usize> {
     pivots
 }
 
-/// The ratio of the largest to the least singular value of some columns of the matrix with these rows; at least as many columns as
-/// rows. Infinite if they do not span the rows.
+/// Returns the ratio of the extreme singular values of some columns, at least as many as rows; infinite for
+/// dependent rows.
 pub fn condition_number(modes: &[Vec<f64>], columns: &[usize]) -> f64 {
     let chosen = Array2::from_shape_fn((modes.len(), columns.len()), |(i, k)| modes[i][columns[k]]);
     let (squares, _) = symmetric_eigen(&chosen.dot(&chosen.t()));
@@ -109,7 +106,6 @@ pub fn condition_number(modes: &[Vec<f64>], columns: &[usize]) -> f64 {
     }
 }
 
-/// A layout by pivoting on the first modes, one per sensor, each step among the units that may join; `None` if no unit can join.
 pub(super) fn search(pool: &Pool, modes: &[Vec<f64>]) -> Option<Vec<usize>> {
     let modes = &modes[..modes.len().min(pool.design.count)];
     let mut pivoting = Pivoting::new(modes);
@@ -146,7 +142,7 @@ mod tests {
         (1..=modes).map(mode).collect()
     }
 
-    /// The definition: at every step the column farthest from the span of the chosen ones, by Gram and Schmidt on all columns.
+    /// Reference: Gram–Schmidt on all columns.
     #[test]
     fn every_pivot_reaches_farthest_out_of_those_before() {
         let modes = sines(6, 97);

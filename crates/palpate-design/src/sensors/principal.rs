@@ -1,10 +1,9 @@
-//! Principal components of the readings at all candidate sites, and how well a layout reconstructs them.
+//! Principal components of the readings at all sites, and the reconstruction from a layout (Tongpadungrod et
+//! al.).
 //!
-//! Tongpadungrod et al. chose sensing positions by the principal components of a beam's readings, so that a few sensors predict the
-//! readings everywhere else. Here, with X the whitened readings (contacts × candidates, each row times the root of its contact's
-//! share), X = U·S·Vᵀ. The columns of V are the components (about 0, so that no mean has to be learnt), and s_j² is the variance of
-//! the reading pattern along component j. The readings of a layout have noise of variance 1. The score is the share of the variance
-//! that the best linear reconstruction from them does not explain.
+//! X = U·S·Vᵀ are the whitened readings (contacts × candidates, each row times the root of its contact's
+//! share). The columns of V are the components about 0, s_j² their variances. The score is the share of
+//! variance that the best linear reconstruction does not explain.
 
 use ndarray::Array2;
 
@@ -12,21 +11,18 @@ use super::limit_objective::padded;
 use super::objective::{Block, ForceBelief, LANES, Objective, State};
 use palpate_numerics::symmetric_eigen;
 
-/// Components beyond these are smaller than the noise.
+/// Largest number of components above the noise.
 const MOST_COMPONENTS: usize = 24;
-/// Components with less than this share of the largest variance are rounding errors.
+/// Least relative variance above rounding errors.
 const LEAST_SHARE: f64 = 1e-12;
 
-/// Principal components of readings.
 pub(super) struct PrincipalComponents {
-    /// The value of a component at every candidate, in descending order of the variances.
+    /// Components at every candidate, in descending order of the variances.
     pub modes: Vec<Vec<f64>>,
-    /// The variance of each component.
     pub variances: Vec<f64>,
 }
 
 impl PrincipalComponents {
-    /// Components of readings with one row per contact.
     pub fn from_readings(readings: &Array2<f64>) -> Self {
         let (squares, contacts) = symmetric_eigen(&readings.dot(&readings.t()));
         let least = LEAST_SHARE * squares.first().copied().unwrap_or(0.0);
@@ -39,11 +35,10 @@ impl PrincipalComponents {
     }
 }
 
-/// The share of variance that a layout does not explain.
+/// Unexplained share of variance.
 pub(super) struct Reconstruction {
     /// [candidate][block of components]
     rows: Vec<Block>,
-    /// Number of blocks of components.
     blocks: usize,
     variances: Vec<f64>,
 }

@@ -9,16 +9,15 @@ use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// Number of halvings of the step, on a line and on a plane. The first step is the distance of sites. On a plane each step needs a
-/// solution.
+/// Halvings of the step from the site spacing: on a line, on a plane (with a solution per step).
 const HALVINGS: usize = 9;
 const HALVINGS_ON_A_PLANE: usize = 3;
-/// Largest number of rounds over all sensors for one step size.
 const MOST_ROUNDS: usize = 20;
 
-/// A compass search: each sensor in turn moves a step along each direction if that improves the score. If none moves, the step is
-/// halved (Kolda, Lewis and Torczon, *SIAM Review* 45, 2003). Sensors that mirror each other move together. Sensors of one kind
-/// stay at least the distance of sites apart.
+/// Compass search: moves each sensor a step if that improves the score, and halves the step if none moves
+/// (Kolda, Lewis and Torczon, *SIAM Review* 45, 2003).
+///
+/// Sensors of one kind keep the spacing of the sites.
 pub(super) fn refine(
     problem: &SensorProblem,
     selection: &[usize],
@@ -52,7 +51,7 @@ pub(super) fn refine(
     Ok(groups.into_iter().flat_map(|group| group.sensors).collect())
 }
 
-/// Sensors that move together, with the row of each; on a plate a row needs a solution.
+/// Mirrored sensors with their rows; on a plate a row needs a solution.
 struct Group {
     sensors: Vec<PlacedSensor>,
     rows: Vec<Vec<Block>>,
@@ -63,7 +62,6 @@ impl Group {
         Self { rows: problem.rows(&sensors), sensors }
     }
 
-    /// The score of the other sensors with this group.
     fn score(&self, problem: &SensorProblem, others: &State) -> f64 {
         match self.rows.as_slice() {
             [one] => problem.objective.score_with(others, one),
@@ -73,7 +71,6 @@ impl Group {
     }
 }
 
-/// Moves one group by a step, if that improves the score.
 fn improve(problem: &SensorProblem, groups: &mut [Group], index: usize, step_m: f64) -> bool {
     let pool = &problem.pool;
     if pool.design.offers[groups[index].sensors[0].offer].kind == SensorKind::Reaction {
@@ -101,8 +98,7 @@ fn improve(problem: &SensorProblem, groups: &mut [Group], index: usize, step_m: 
     moved
 }
 
-/// The group with its first sensor moved, and the second at the mirror image. A single sensor in the middle of a symmetric layout
-/// keeps its place along the length.
+/// Moves a group. A single sensor in the middle of a symmetric layout keeps its x.
 fn shifted(problem: &SensorProblem, group: &[PlacedSensor], [x_m, y_m]: [f64; 2]) -> Vec<PlacedSensor> {
     let extent = problem.pool.extent;
     let is_mirrored = problem.pool.design.symmetry == Symmetry::Wanted;

@@ -1,4 +1,4 @@
-//! Sensitivities of sensors to contacts: the rows that criteria use.
+//! Sensitivities of sensors to contacts: the rows of the criteria.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -18,9 +18,9 @@ use palpate_mechanics::surface::{
 };
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// Upper bound of the bytes of all candidates' rows.
+/// Largest size of all candidates' rows, bytes.
 const MOST_BYTES: f64 = 4e9;
-/// Response functions that are computed together: a plate solves for them in few sweeps, and each takes some 200 kB there.
+/// Response functions per batch, with about 200 kB each on a plate.
 const TOGETHER: usize = 48;
 /// Largest number of contacts for principal components.
 const MOST_SNAPSHOTS: usize = 64;
@@ -30,13 +30,12 @@ const MOST_SNAPSHOTS: usize = 64;
 pub struct DesignCost {
     /// Number of candidate sensors.
     pub candidates: usize,
-    /// Peak memory, in bytes, besides the program itself.
+    /// Peak memory of the design, bytes.
     pub memory_bytes: f64,
-    /// Time of the searches, in seconds of a core of some 3 GHz; simulated calibrations are extra.
+    /// Time of the searches at about 3 GHz, s; without simulated calibrations.
     pub seconds: f64,
 }
 
-/// A sensor at a position of the surface.
 #[derive(Clone, Copy)]
 pub(super) struct SensorAt<'a> {
     pub kind: SensorKind,
@@ -45,7 +44,6 @@ pub(super) struct SensorAt<'a> {
 }
 
 impl<'a> SensorAt<'a> {
-    /// Candidates of a design.
     pub fn of_design(placed: &[PlacedSensor], design: &'a SensorDesign) -> Vec<Self> {
         let at = |PlacedSensor { offer, position }: &PlacedSensor| {
             let offer = &design.offers[*offer];
@@ -61,7 +59,6 @@ impl<'a> From<&'a Sensor> for SensorAt<'a> {
     }
 }
 
-/// The contacts of a design on its surface, for which sensitivities are computed.
 #[derive(Clone)]
 pub(super) struct Sensitivity<'a> {
     pub surface: &'a dyn Surface,
@@ -71,14 +68,14 @@ pub(super) struct Sensitivity<'a> {
 }
 
 impl Sensitivity<'_> {
-    /// True for a contact that counts in the score of layouts. Over a support only its reaction determines an unknown force.
-    /// Layouts are not compared there; [`palpate_mechanics::limit::LimitCurve::summary`] excludes such contacts too.
+    /// Excludes contacts over a support if the force is unknown, as
+    /// [`palpate_mechanics::limit::LimitCurve::summary`].
     pub fn is_judged(&self, position: Position) -> bool {
         self.force == Force::Known
             || self.surface.insensitive_sensor(SensorKind::Deflection, position).is_none()
     }
 
-    /// Weights of the contacts in the score of layouts; 0 for excluded contacts.
+    /// Weights in the score; 0 for excluded contacts.
     pub fn judged_weights(&self) -> Vec<f64> {
         let WeightedContacts { positions, weights } = &self.contacts;
         let mut judged = weights.clone();
@@ -90,18 +87,15 @@ impl Sensitivity<'_> {
         judged
     }
 
-    /// Number of unknowns of a contact.
     fn unknowns(&self) -> usize {
         usize::from(self.force == Force::Unknown) + self.surface.extent().dimensions()
     }
 
-    /// Number of blocks in the row of a sensor.
     fn row_size(&self) -> usize {
         self.unknowns() * self.contacts.len().div_ceil(LANES)
     }
 
-    /// Rows of some sensors: derivatives of the whitened reading at every contact with respect to ln W if the force is unknown, to
-    /// x, and to y on a plane; 0 where the reading is saturated.
+    /// Rows: derivatives of whitened readings by ln W (unknown force), x, and y (plane); 0 where saturated.
     pub fn rows(&self, sensors: &[SensorAt]) -> Vec<Vec<Block>> {
         let mut rows = vec![vec![[0.0; LANES]; self.row_size()]; sensors.len()];
         let filled = for_each_response(self.surface, sensors, Watch::NONE, |i, response| {
@@ -112,7 +106,6 @@ impl Sensitivity<'_> {
         rows
     }
 
-    /// Writes the row of a sensor into zeros.
     fn fill_row(&self, row: &mut [Block], response: &dyn ResponseFunction, channel: &ChannelModel) {
         for (i, &position) in self.contacts.positions.iter().enumerate() {
             let contact = Contact { position, force_n: self.force_n };
@@ -120,7 +113,6 @@ impl Sensitivity<'_> {
         }
     }
 
-    /// Writes the sensitivity of a sensor to one contact into its row.
     fn put(
         &self,
         row: &mut [Block],
@@ -140,7 +132,7 @@ impl Sensitivity<'_> {
         }
     }
 
-    /// The rows of all candidates, one after the other, by the faster of two ways to solve for them.
+    /// Rows of all candidates by the faster of two solvers.
     pub fn table(&self, candidates: &[SensorAt], watch: Watch) -> Result<Vec<Block>, DesignError> {
         self.table_by(Solving::sooner(candidates.len(), self.contacts.len()), candidates, watch)
     }
@@ -194,13 +186,11 @@ impl Sensitivity<'_> {
         Ok(table)
     }
 
-    /// Work and memory of the rows of `candidates` sensors, and of searching layouts of `count` sensors among them.
     pub fn cost(&self, candidates: usize, count: usize) -> DesignCost {
-        /// Passes of a search over all candidates, per sensor of a layout; and the time per number of a row in one pass.
+        /// Passes over all candidates per sensor, and seconds per number in one pass.
         const PASSES: f64 = 12.0;
         const SECONDS_EACH: f64 = 1e-9;
-        /// Solutions that the refinement takes per sensor of a layout. They are solved one by one; the number is in solutions
-        /// solved together.
+        /// Cost of the refinement per sensor, in batched solutions.
         const REFINING: f64 = 200.0;
         let table = self.table_bytes(candidates);
         let sums = PASSES * count as f64 * table / size_of::<f64>() as f64;
@@ -223,12 +213,10 @@ impl Sensitivity<'_> {
         }
     }
 
-    /// Bytes of the rows of `candidates` sensors.
     fn table_bytes(&self, candidates: usize) -> f64 {
         (candidates * self.row_size() * size_of::<Block>()) as f64
     }
 
-    /// The solver by contacts, if that way is chosen and the surface provides it.
     fn by_contact(&self, solving: Solving, sensors: &[SensorAt]) -> Option<Arc<dyn ReadingsByContact + '_>> {
         if solving == Solving::BySensor {
             return None;
@@ -237,7 +225,6 @@ impl Sensitivity<'_> {
         self.surface.readings_by_contact(&places)
     }
 
-    /// A criterion on a table of rows.
     pub fn objective(
         &self,
         table: Arc<Vec<Block>>,
@@ -262,8 +249,7 @@ impl Sensitivity<'_> {
         }
     }
 
-    /// Whitened readings of all candidates, one row per contact, each row times the root of the contact's share. With many
-    /// contacts, an even sample.
+    /// Whitened readings, a row per contact (a sample of many), times the root of its share.
     pub fn readings(&self, candidates: &[SensorAt], watch: Watch) -> Result<Array2<f64>, Cancelled> {
         let sample = self.contacts.sample(MOST_SNAPSHOTS);
         self.readings_by(Solving::sooner(candidates.len(), sample.len()), candidates, &sample, watch)
@@ -305,7 +291,6 @@ impl Sensitivity<'_> {
     }
 }
 
-/// Calls `take` with the index and response function of each sensor. A few response functions are solved together.
 fn for_each_response(
     surface: &dyn Surface,
     sensors: &[SensorAt],
@@ -334,7 +319,6 @@ mod tests {
     use palpate_mechanics::sensing::SensorKind::{Deflection, Slope, Strain};
     use palpate_mechanics::surface::Extent;
 
-    /// Sensors of three kinds. One of them saturates.
     fn sensors<'a>(channels: &'a [ChannelModel; 2], extent: Extent) -> Vec<SensorAt<'a>> {
         let place = |i: usize| {
             let [x, y] = [i as f64 * 0.618, i as f64 * 0.755].map(|share| share.fract().clamp(0.01, 0.99));

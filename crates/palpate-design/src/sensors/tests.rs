@@ -49,7 +49,6 @@ fn places(designed: &Designed) -> Vec<f64> {
     designed.layout.sensors().iter().map(|sensor| (sensor.position.x_m * 1e3).round()).collect()
 }
 
-/// Eight deflection sensors, contacts from 20 to 380 mm every 5 mm, force unknown.
 #[test]
 fn the_papers_beam_gains_at_least_18_percent() {
     let (setup, design) = sensor_design();
@@ -61,7 +60,6 @@ fn the_papers_beam_gains_at_least_18_percent() {
     assert!(limit <= 0.82 * even && limit <= 2.15e-3, "{limit}: {:?}", places(&designed));
 }
 
-/// The assessment agrees with the limit, and scores never exceed the score of the prior alone.
 #[test]
 fn scores_agree_with_the_limit() {
     let (setup, mut design) = sensor_design();
@@ -80,7 +78,7 @@ fn scores_agree_with_the_limit() {
     assert!((one.score / (0.4 / 12f64.sqrt()) - 1.0).abs() < 1e-3, "{one:?}");
 }
 
-/// C(20, 4) at random: kinds, noise, contacts, criterion, known or unknown force.
+/// C(20, 4) at random: kinds, noise, contacts, criterion, force.
 fn random_problem(setup: &Setup, design: &SensorDesign, rng: &mut impl Rng) -> SensorDesign {
     let kinds = [
         offer(SensorKind::Deflection, 10f64.powf(rng.random_range(-6.0..-5.0)), 1.0),
@@ -238,7 +236,6 @@ fn budgets_buy_what_helps_most() {
     assert!(poor >= fair && fair >= rich && rich < 0.99 * poor, "{poor} {fair} {rich}");
 }
 
-/// Three spans of a bridge on four supports, read by strains.
 fn bridge() -> Setup {
     let simple = |at_m| BeamSupport { at_m, kind: BeamSupportKind::Simple };
     let spec = SupportedBeamSpec {
@@ -291,7 +288,6 @@ fn contacts_over_supports_count_for_nothing_where_the_force_is_unknown() {
     assert_eq!(refused, DesignError::OverSupports { contacts: 2 });
 }
 
-/// With an unknown force, two reaction sensors determine the position at the supports, which deflections do not.
 #[test]
 fn mixed_kinds_go_beyond_deflections() {
     let (setup, mut design) = sensor_design();
@@ -323,7 +319,6 @@ fn many_sites_are_searched_as_few_are() {
     assert!((many / few - 1.0).abs() < 0.005, "{many} {few}");
 }
 
-/// Units outside the samples are included too: no single exchange for any unit improves the score by a millionth.
 #[test]
 fn no_exchange_for_one_of_very_many_matters() {
     let (setup, mut design) = sensor_design();
@@ -413,7 +408,6 @@ fn a_search_can_be_stopped() {
     assert_eq!(stopped, Err(DesignError::Cancelled(Cancelled)));
 }
 
-/// A method called alone gives the layout that it gives among all.
 #[test]
 fn a_method_that_is_asked_for_gives_its_own_layout() {
     let (setup, mut design) = sensor_design();

@@ -2,7 +2,6 @@ use std::sync::LazyLock;
 
 use super::*;
 
-/// The founding paper's beam.
 static LINE: LazyLock<Extent> = LazyLock::new(|| Extent::line(0.4).unwrap());
 static PLANE: LazyLock<Extent> = LazyLock::new(|| Extent::plane(0.3, 0.2).unwrap());
 
@@ -38,7 +37,7 @@ fn even_positions_over_a_portion_include_its_ends() {
     let over = |portion| Arrangement::EvenOver { portion };
     assert_close(&millimetres(&over((0.1, 0.9)), 5), &[40.0, 120.0, 200.0, 280.0, 360.0]);
     assert_close(&millimetres(&over((0.1, 0.5)), 1), &[120.0]);
-    // The paper's ten even positions are those over their own span.
+    // The paper's ten even positions span 0.05 to 0.95 of the length.
     assert_close(&millimetres(&over((0.05, 0.95)), 10), &millimetres(&Arrangement::Even, 10));
     for portion in [(0.5, 0.5), (-0.1, 0.5), (0.5, 1.1), (f64::NAN, 0.5)] {
         let refused = over(portion).positions(3, *LINE).unwrap_err();
@@ -47,7 +46,6 @@ fn even_positions_over_a_portion_include_its_ends() {
     assert!(matches!(over((0.1, 0.9)).positions(3, *PLANE), Err(ArrangementError::LineOnPlane { .. })));
 }
 
-/// Both edges at one pitch, and between them `middle` positions from 100 to 300 mm.
 fn table_3(edge: u32, pitch_mm: f64, middle: &[f64]) -> Vec<f64> {
     let left = (1..=edge).map(|i| f64::from(i) * pitch_mm);
     let right = (1..=edge).rev().map(|i| 400.0 - f64::from(i) * pitch_mm);

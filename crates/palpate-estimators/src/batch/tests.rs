@@ -13,7 +13,7 @@ use palpate_mechanics::sensing::ChannelModel;
 use palpate_mechanics::surface::ForceDirection;
 use palpate_mechanics::units::{newtons, um};
 
-/// Locators of every method that suits a setup. Networks are trained briefly, to keep the test short.
+/// Locators of every suitable method. Networks are trained briefly, to keep the test short.
 fn locators(setup: &Setup, presses: &Recording) -> Vec<Locator> {
     let all = contenders(setup, &Estimator::default(), 200 * presses.rows.len());
     all.iter()
@@ -21,8 +21,6 @@ fn locators(setup: &Setup, presses: &Recording) -> Vec<Locator> {
         .collect()
 }
 
-/// Readings of a recording. Further readings are zeros, readings times 3, sums of a reading and the mirrored one from the end, and readings
-/// times 1e300.
 fn readings(recording: &Recording) -> Vec<f64> {
     let rows: Vec<&[f64]> = recording.rows.iter().map(|row| row.reading.as_slice()).collect();
     let mut readings = rows.concat();
@@ -38,7 +36,6 @@ fn readings(recording: &Recording) -> Vec<f64> {
     readings
 }
 
-/// Asserts that all ways to locate a batch give the estimates of single readings, and returns their statuses.
 fn assert_agree(locator: &Locator, readings: &[f64]) -> Vec<Status> {
     let kind = locator.kind();
     let each = readings.chunks_exact(locator.layout().len());
@@ -61,7 +58,6 @@ fn assert_agree(locator: &Locator, readings: &[f64]) -> Vec<Status> {
     single.iter().map(|estimate| estimate.status).collect()
 }
 
-/// Benches of every estimator, with presses.
 fn benches() -> Vec<(Setup, Recording)> {
     let measured = raw_setup(paper(0.0, 1).setup.surface().extent(), 8, None);
     let beam = paper(um(5.0), 4);
@@ -119,7 +115,6 @@ fn a_batch_of_every_method_answers_as_readings_one_by_one_do() {
     }
 }
 
-/// A locator on the paper's beam, and readings of several blocks.
 fn several_blocks() -> (Locator, Vec<f64>) {
     let example = paper(um(5.0), 4);
     let locator = Influence::default()

@@ -1,4 +1,4 @@
-//! The centroid that array sensors use: the magnitude-weighted mean of the sensors' positions, calibrated by a linear map.
+//! Calibrated centroid of array sensors.
 
 use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
@@ -15,12 +15,10 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{Cholesky, NotPositiveDefinite};
 
-/// The calibrated centroid. Channel i has the weight w_i = |r_i| / Σ|r_j|, its reading in units of the largest that its kind has in the training
-/// recording.
+/// Calibrated centroid with weights w_i = |r_i| / Σ|r_j|, in units of the largest reading of each kind.
 ///
-/// With sensors at known positions p_i the estimate is A·(Σ w_i·p_i) + b, with A and b from least squares over the
-/// training recording. Raw channels have no positions, so least squares gives each one a position of its own:
-/// the estimate is Σ w_i·p_i.
+/// The estimate is A·(Σ w_i·p_i) + b at known sensor positions p_i, with A and b by least squares. For raw
+/// channels least squares gives the p_i of Σ w_i·p_i.
 ///
 /// ```
 /// use palpate_estimators::{arrangement::Training, fit::Fit, setup::Setup, centroid::Centroid};
@@ -36,31 +34,31 @@ use palpate_numerics::{Cholesky, NotPositiveDefinite};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Centroid;
 
-/// A recording that the centroid cannot be calibrated by.
+/// Recording that does not calibrate a centroid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CentroidFitError {
-    /// One sensor has the same centroid for any contact.
+    /// Fewer than two enabled sensors.
     #[error("a centroid needs at least 2 sensors that are not dead; the layout has {found}")]
     TooFewSensors {
-        /// Live sensors of the layout.
+        /// Enabled sensors.
         found: usize,
     },
-    /// Fewer positions than unknowns of the map.
+    /// Fewer positions than unknowns.
     #[error(transparent)]
     Positions(#[from] TooFewPositions),
-    /// All readings of the sensors of one kind are 0.
+    /// Readings of one kind that are all 0.
     #[error("every {kind} reading of the recording is 0; a centroid weights sensors by their readings")]
     Silent {
-        /// The kind.
+        /// Kind of the sensors.
         kind: SensorKind,
     },
-    /// All sensors are at the same place, or all readings are alike.
+    /// Centroids that do not distinguish positions.
     #[error("the centroids of the recording do not distinguish its positions: {0}")]
     Alike(#[from] NotPositiveDefinite),
-    /// The recording's channels are not the setup's.
+    /// Channel mismatch.
     #[error(transparent)]
     Channels(#[from] ChannelMismatch),
-    /// The fit was stopped.
+    /// Cancelled.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
@@ -81,7 +79,6 @@ impl Fit for Centroid {
     }
 }
 
-/// A locator with an empty map.
 fn uncalibrated(setup: &Setup, recording: &Recording) -> Result<CentroidLocator, CentroidFitError> {
     let sensors = setup.layout().sensors();
     let live = sensors.iter().filter(|sensor| !sensor.channel.dead).count();
@@ -115,9 +112,7 @@ fn uncalibrated(setup: &Setup, recording: &Recording) -> Result<CentroidLocator,
     })
 }
 
-/// Least squares of the positions (x, and y where there is one) on the terms, row by row of the map.
-///
-/// A ridge of 10⁻¹² of the largest diagonal entry keeps terms that a recording does not excite, such as a dead channel's, at 0.
+/// Ridge of 10⁻¹² of the largest diagonal entry, which keeps unexcited terms at 0.
 fn calibrate(locator: &CentroidLocator, rows: &[Row]) -> Result<Vec<Vec<f64>>, NotPositiveDefinite> {
     let terms = locator.terms();
     let mut normal = Array2::zeros((terms, terms));
@@ -138,8 +133,7 @@ fn calibrate(locator: &CentroidLocator, rows: &[Row]) -> Result<Vec<Vec<f64>>, N
     Ok(right[..locator.extent.dimensions()].iter().map(|right| cholesky.solve(right).to_vec()).collect())
 }
 
-/// Errors (x, y) in metres at positions that the map was not calibrated on, of at most [`FOLDS`] maps; empty where a fold leaves fewer positions
-/// than terms.
+/// Empty where a fold has fewer positions than terms.
 fn held_out_errors(
     locator: &CentroidLocator,
     recording: &Recording,
@@ -164,40 +158,38 @@ fn held_out_errors(
     Ok(errors)
 }
 
-/// Positions are held out one by one up to this many, and in groups beyond.
 const FOLDS: usize = 20;
 
-/// A centroid that locates; see [`Centroid`].
+/// Fitted [`Centroid`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CentroidLocator {
-    /// The surface.
+    /// Extent of the surface.
     pub extent: Extent,
-    /// One over the largest training reading of the channel's kind, in the inverse of its unit; 0 for a dead channel.
+    /// Inverse of the kind's largest training reading; 0 for a disabled channel.
     pub channel_scales: Vec<f64>,
-    /// Points of the weighted centroid.
+    /// Points of the centroid.
     pub weighing: Weighing,
-    /// A row for x, and one for y on a two-dimensional surface: with [`Weighing::Positions`] the factor of the
-    /// centroid's x (and y), then a constant in metres; with [`Weighing::Channels`] a position in metres a channel.
+    /// Row per coordinate: factors and a constant ([`Weighing::Positions`]), or a position per channel
+    /// ([`Weighing::Channels`]), in metres.
     pub map: Vec<Vec<f64>>,
-    /// The contact's force in newtons, where it is known.
+    /// Known force.
     pub force_n: Option<f64>,
-    /// Errors of maps at positions that they were not calibrated on.
+    /// Cross-validated errors.
     pub spread: Option<HeldOutErrors>,
 }
 
-/// Points that the channels' magnitudes weight.
+/// Points of the centroid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Weighing {
-    /// The sensors' known positions, one a channel.
+    /// Known sensor positions.
     Positions(Vec<Position>),
-    /// Positions that calibration finds, for channels that have none.
+    /// Calibrated positions of raw channels.
     Channels,
 }
 
 impl CentroidLocator {
-    /// Unknowns of the map for a coordinate.
     fn terms(&self) -> usize {
         match self.weighing {
             Weighing::Positions(_) => 1 + self.extent.dimensions(),
@@ -205,7 +197,6 @@ impl CentroidLocator {
         }
     }
 
-    /// Terms that the map multiplies; `None` where every reading is 0.
     fn term_values(&self, reading: &[f64]) -> Option<Vec<f64>> {
         let mut weights: Vec<f64> =
             reading.iter().zip(&self.channel_scales).map(|(r, s)| (r * s).abs()).collect();
@@ -225,7 +216,6 @@ impl CentroidLocator {
         })
     }
 
-    /// The mapped centroid; `None` where every reading is 0.
     fn position(&self, reading: &[f64]) -> Option<Position> {
         let terms = self.term_values(reading)?;
         let mapped = |row: &Vec<f64>| row.iter().zip(&terms).map(|(m, t)| m * t).sum::<f64>();

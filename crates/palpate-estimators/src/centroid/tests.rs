@@ -1,5 +1,3 @@
-//! The centroid on readings for which it is exact, and on others.
-
 use super::*;
 use crate::fit::{Fit, FitTask, Locate};
 use crate::recording::{Recording, Row};
@@ -19,7 +17,6 @@ fn fit(setup: &Setup, rows: Vec<Row>) -> Result<CentroidLocator, CentroidFitErro
     Ok(locator)
 }
 
-/// A pad of raw channels; `width_m` where it is two-dimensional.
 fn pad(channels: usize, width_m: Option<f64>) -> Setup {
     let mut layout = Layout::even(SensorKind::Raw, channels, 0.1);
     let name = |(i, sensor): (usize, &mut Sensor)| sensor.name = format!("c{i}");
@@ -27,7 +24,7 @@ fn pad(channels: usize, width_m: Option<f64>) -> Setup {
     Setup::new(Extent::new(0.1, width_m).unwrap()).with_layout(layout).unwrap()
 }
 
-/// Two supports share a force by the lever: their centroid is the contact itself.
+/// Two supports share a force by the lever rule, so the centroid is the contact position.
 fn scales() -> Setup {
     let beam = Beam::new(0.4, 0.04, 1.2e-3, 200e9).unwrap();
     let support = |name: &str, x_m| Sensor {

@@ -1,8 +1,6 @@
-//! Contact position and force from the beam's own equations, without training: after Ellis and his colleagues (1994) and
-//! Stone and Brett (1995), who solved the equations of a supported strip for the contact.
+//! Closed-form contact position and force of a beam (Ellis and others 1994; Stone and Brett 1995).
 //!
-//! Between two neighbouring sensors every influence function of a beam is a cubic polynomial of the contact position.
-//! So the best explanation of a reading is a root of a polynomial. All roots are computed, and all are reported.
+//! Influence functions are cubic between sensors, so least-squares estimates are roots of polynomials.
 
 mod polynomial;
 
@@ -27,14 +25,13 @@ use palpate_numerics::watch::Cancelled;
 use palpate_numerics::{NORMAL_95, clamped_interval, normal_interval_95};
 use polynomial::Polynomial;
 
-/// The closed form: it needs a beam and its sensors, and does not learn from a recording.
+/// Closed-form estimator of a beam, without training.
 ///
-/// - Only scales under both supports: the moment balance a = l·R_right/(R_left + R_right), W = R_left + R_right.
-/// - Otherwise every deflection, slope, strain and reaction that the layout has: position, and force where it is unknown, by
-///   least squares weighted by the channels' noise; with two readings and an unknown force this is the root of their ratio.
+/// - Scales under both supports alone: a = l·R_right/(R_left + R_right), W = R_left + R_right.
+/// - Otherwise: noise-weighted least squares of position and unknown force.
 ///
-/// Uncertainty is propagated from the channels' noise (and quantisation) to first order. Where the layout gives no noise for a channel, there is no
-/// uncertainty, and a reading with a residual above a tenth of itself is outside the model.
+/// First-order uncertainty from noise and quantisation. Without noise there is none, and a residual above a
+/// tenth of the reading is outside the model.
 ///
 /// ```
 /// use palpate_estimators::{arrangement::Training, fit::Fit, setup::Setup, closed_form::ClosedForm};
@@ -49,42 +46,42 @@ use polynomial::Polynomial;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ClosedForm {
-    /// False-alarm rate: share of untouched readings that may be detected as a contact.
+    /// False-alarm rate.
     pub false_alarm_rate: FalseAlarmRate,
 }
 
-/// A bench that the closed form does not suit.
+/// Setup that the closed form does not suit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ClosedFormFitError {
-    /// A surface without a model.
+    /// Surface without a model.
     #[error("the closed form needs a beam's dimensions and stiffness; a measured surface has no model")]
     NoModel,
-    /// Another kind of surface.
+    /// Surface other than a beam.
     #[error("the closed form needs a beam on two simple supports; the surface is another one")]
     NotABeam,
-    /// A channel in units of its own.
+    /// Raw channel.
     #[error(
         "the closed form needs deflection, slope, strain or reaction sensors; the layout has a {kind} channel"
     )]
     NotModelled {
-        /// Quantity that the channel measures.
+        /// Quantity of the channel.
         kind: SensorKind,
     },
-    /// Too few sensors that respond to a contact.
+    /// Too few sensitive sensors.
     #[error(
         "the closed form needs at least {needed} sensors that see a contact ({}); the layout has {found}",
         if *needed == 1 { "the force is known" } else { "the force is unknown" }
     )]
     TooFewSensors {
-        /// Unknowns: 1 for the position, and 1 for a force that is unknown.
+        /// Number of unknowns: position, and force where unknown.
         needed: usize,
-        /// Sensors that are not dead, with an influence other than 0 somewhere.
+        /// Number of sensitive sensors.
         found: usize,
     },
-    /// The recording's channels are not the setup's.
+    /// Channel mismatch.
     #[error(transparent)]
     Channels(#[from] ChannelMismatch),
-    /// The fit was stopped.
+    /// Cancelled.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
@@ -122,29 +119,28 @@ impl Fit for ClosedForm {
     }
 }
 
-/// A closed form that locates; see [`ClosedForm`].
+/// Fitted [`ClosedForm`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClosedFormLocator {
-    /// The surface.
+    /// Surface.
     pub beam: Beam,
     /// Sensors.
     pub layout: Layout,
-    /// The contact's force in newtons, where it is known.
+    /// Known force.
     pub force_n: Option<f64>,
-    /// Greatest force of a contact of unknown force, in newtons; `None` where neither the setup nor the calibration gives one.
+    /// Upper bound of an unknown force, where given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub greatest_force_n: Option<f64>,
-    /// False-alarm rate: share of untouched readings that may be detected as a contact.
+    /// False-alarm rate.
     #[serde(default)]
     pub false_alarm_rate: FalseAlarmRate,
-    /// Offset of each channel, in its SI unit; empty where the recording has no untouched row.
+    /// Offsets in SI units; empty without untouched rows.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub offsets: Vec<f64>,
 }
 
 impl ClosedFormLocator {
-    /// Channels that are not dead and respond to a contact somewhere.
     fn seeing(&self) -> Vec<usize> {
         let sees = |sensor: &Sensor| {
             let quarters = [0.25, 0.5, 0.75].map(|share| Position::along(share * self.beam.length_m()));
@@ -154,12 +150,12 @@ impl ClosedFormLocator {
         (0..self.layout.len()).filter(|i| sees(&self.layout.sensors()[*i])).collect()
     }
 
-    /// True when the layout gives the noise of every channel, by which an untouched reading is detected.
+    /// True where the layout gives all noise, which detection needs.
     pub fn knows_noise(&self) -> bool {
         self.weights(&self.seeing()).1 == Noise::Known
     }
 
-    /// Factor of each channel's readings: 1/σ where every noise is known, else 1/full scale.
+    /// 1/σ where all noise is known, else 1/full scale.
     fn weights(&self, channels: &[usize]) -> (Vec<f64>, Noise) {
         let sensors = || channels.iter().map(|i| &self.layout.sensors()[*i]);
         let known: Vec<f64> = sensors().map(|s| 1.0 / s.channel.reading_sd()).collect();
@@ -169,7 +165,6 @@ impl ClosedFormLocator {
         (sensors().map(|s| 1.0 / self.beam.full_scale(s.kind)).collect(), Noise::Unknown)
     }
 
-    /// The stretches between neighbouring sensors, supports included.
     fn segments(&self, channels: &[usize], weights: &[f64]) -> Vec<Segment> {
         let length_m = self.beam.length_m();
         let mut ends: Vec<f64> = channels.iter().map(|i| self.layout.sensors()[*i].position.x_m).collect();
@@ -183,7 +178,6 @@ impl ClosedFormLocator {
         ends.windows(2).map(|pair| Segment::new(pair[0], pair[1], channels.len(), influence)).collect()
     }
 
-    /// The channels under the left and the right support, where only these two respond to a contact.
     fn scales(&self, channels: &[usize]) -> Option<(usize, usize)> {
         let &[first, second] = channels else { return None };
         let sensor = |i: usize| &self.layout.sensors()[i];
@@ -193,10 +187,8 @@ impl ClosedFormLocator {
         (reactions && apart).then_some(if a < b { (first, second) } else { (second, first) })
     }
 
-    /// The moment balance of two supports with scales; the position may lie beyond them.
-    ///
-    /// For an unknown force W a = l·R_right/W and W = R_left + R_right, and to first order ∂a/∂R_left = −a/W, ∂a/∂R_right = (l − a)/W,
-    /// ∂W/∂R = 1; for a known one a is from weighted least squares of R_left = W·(1 − a/l) and R_right = W·a/l.
+    /// Unknown force: a = l·R_right/W and W = R_left + R_right, with ∂a/∂R_left = −a/W, ∂a/∂R_right = (l −
+    /// a)/W, ∂W/∂R = 1. Known force: least squares of R_left = W·(1 − a/l) and R_right = W·a/l.
     fn balance(&self, (left, right): (usize, usize), reading: &[f64], noise: Noise) -> Estimate {
         let length_m = self.beam.length_m();
         let (left_n, right_n) = (reading[left], reading[right]);
@@ -232,7 +224,7 @@ impl ClosedFormLocator {
         let (status, held_m) = if force_n <= 0.0 || is_too_hard || misfit_n.powi(2) > tolerated {
             (Status::OutsideModel, position_m)
         } else if on_surface || near(0.0) || near(length_m) {
-            // Noise may move a contact at the very edge a little beyond it.
+            // Noise may shift the estimate of a contact at an edge beyond it.
             (Status::Located, position_m.clamp(0.0, length_m))
         } else {
             (Status::OutsideSurface, position_m)
@@ -248,7 +240,6 @@ impl ClosedFormLocator {
     }
 }
 
-/// Noise of the channels: given by the layout, or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Noise {
     Known,
@@ -282,7 +273,7 @@ impl Locate for ClosedFormLocator {
         if let (false, Some(scales)) = (rule.is_within_noise(size), scales) {
             return self.balance(scales, reading, noise);
         }
-        // χ² of a contact is at least 0, so that most readings of noise need no search.
+        // χ² of a contact is at least 0, so most readings of noise need no search.
         if rule.is_no_contact(size, 0.0) {
             return NO_CONTACT;
         }
@@ -326,29 +317,24 @@ impl Locate for ClosedFormLocator {
     }
 }
 
-/// Explanations with χ² above the least by this have a share of e⁻¹² of the probability.
+/// χ² excess with a posterior share of e⁻¹².
 const NEGLIGIBLE: f64 = 24.0;
 
-/// The greatest force of contacts of unknown force: the setup's, or a multiple of a recording's hardest press; `None` where there is neither.
 fn greatest_force_n(setup: &Setup, recording: &Recording) -> Option<f64> {
     let hardest = recording.rows.iter().filter_map(|row| row.force_n).fold(0.0, f64::max);
     setup.greatest_force_n().or((hardest > 0.0).then_some(DECADE * hardest))
 }
 
-/// Squared residuals that differ by less than this share of the reading are the same in double precision.
 const ROUNDING: f64 = 1e-13;
 
-/// Posterior of a whitened reading, with the force in newtons where it is known.
 struct Posterior<'a> {
     segments: &'a [Segment],
     reading: &'a [f64],
     force_n: Option<f64>,
-    /// Upper bound of an unknown force, in newtons.
     greatest_force_n: Option<f64>,
     noise: Noise,
 }
 
-/// A position that explains the reading better than its neighbours do, or a stretch of positions that explain it equally well.
 #[derive(Clone, Copy, Debug)]
 struct Explanation {
     from_m: f64,
@@ -356,7 +342,6 @@ struct Explanation {
     position_m: f64,
     force_n: f64,
     chi_squared: f64,
-    /// Covariance of position and force: xx, xf, ff.
     covariance: [f64; 3],
 }
 
@@ -388,8 +373,7 @@ impl Posterior<'_> {
         estimate
     }
 
-    /// The estimate where force and place trade off: a competing place is near an end, or its force is above the greatest. `None`
-    /// elsewhere, and where the noise is not known.
+    /// `None` without a trade-off, and for unknown noise.
     fn trade_off(&self, found: &[Explanation], rule: &StatusRule) -> Option<Estimate> {
         if self.noise == Noise::Unknown {
             return None;
@@ -430,17 +414,15 @@ impl Posterior<'_> {
         Some(estimate)
     }
 
-    /// True for the reading of a distributed contact, about every competing place; false where the noise is not known.
     fn is_spread(&self, found: &[Explanation]) -> bool {
         let least = found.iter().fold(f64::INFINITY, |least, at| least.min(at.chi_squared));
         let competes = |at: &&Explanation| at.chi_squared <= least + NEGLIGIBLE;
         let bound = spread_bound(1);
-        // The square of the residual is at least that of its part.
+        // The squared residual is at least its component along the test direction.
         let is_spread = |at: &Explanation| at.chi_squared > bound && self.spread(at) > bound;
         self.noise == Noise::Known && found.iter().filter(competes).all(is_spread)
     }
 
-    /// Score of a [distributed contact](crate::spread) about a place.
     fn spread(&self, Explanation { position_m, force_n, .. }: &Explanation) -> f64 {
         let reads = |[x_m, _, force_n]: [f64; 3]| -> Vec<f64> {
             self.influence_at(x_m).iter().map(|(f, _)| force_n * f).collect()
@@ -451,7 +433,6 @@ impl Posterior<'_> {
         spread_score(about, self.reading.iter().copied(), reads)
     }
 
-    /// h̃ of every channel at a place, and its derivative by the position in 1/m.
     fn influence_at(&self, x_m: f64) -> Vec<(f64, f64)> {
         let segment = self.segments.iter().find(|segment| x_m <= segment.to_m).or(self.segments.last());
         segment.map(|segment| segment.influence_at(x_m)).unwrap_or_default()
@@ -465,8 +446,7 @@ impl Posterior<'_> {
         self.reading.iter().map(|r| r * r).sum()
     }
 
-    /// Local minima of the squared residual over the beam. Between neighbouring candidates it is monotone, as all its stationary points and all the
-    /// ends of segments are candidates.
+    /// The squared residual is monotone between stationary points and segment ends.
     fn explanations(&self) -> Vec<Explanation> {
         let mut candidates: Vec<Explanation> = Vec::new();
         for segment in self.segments {
@@ -480,7 +460,7 @@ impl Posterior<'_> {
             match stretches.last_mut() {
                 Some(last) if (last.chi_squared - next.chi_squared).abs() <= same => {
                     last.to_m = next.to_m;
-                    // The middle of a stretch of positions that explain the reading equally well.
+                    // Middle of an interval of equally good positions.
                     last.position_m = 0.5 * (last.from_m + last.to_m);
                 }
                 _ => stretches.push(next),
@@ -512,8 +492,7 @@ impl Posterior<'_> {
         }
     }
 
-    /// Inverse of the Fisher information of (a, W), JᵀJ with the Jacobian J = (W·h̃′, h̃). A position that the reading
-    /// does not determine has the variance of a uniform distribution over the beam, l²/12.
+    /// (JᵀJ)⁻¹ with J = (W·h̃′, h̃); l²/12 for an undetermined position.
     fn covariance(&self, influence: &[(f64, f64)], force_n: f64) -> [f64; 3] {
         let (mut xx, mut xf, mut ff) = (0.0, 0.0, 0.0);
         for (h, slope) in influence {
@@ -536,8 +515,7 @@ impl Posterior<'_> {
         }
     }
 
-    /// Logarithm of the probability around an explanation, up to a constant, by Laplace's method. Where the noise is unknown only practically exact
-    /// explanations count.
+    /// Laplace's method; only exact explanations for unknown noise.
     fn log_weight(&self, explanation: &Explanation) -> f64 {
         match self.noise {
             Noise::Known => {
@@ -565,9 +543,9 @@ impl Posterior<'_> {
     }
 }
 
-/// A stretch of the beam between neighbouring sensors or supports, where the influence functions are polynomials.
+/// Segment between neighbouring sensors or supports.
 ///
-/// Symbols: r̃ reading and h̃(a) influence at position a, both whitened; W force; N = r̃ᵀh̃, D = h̃ᵀh̃. Within a segment the
+/// Symbols: r̃ reading and h̃(a) influence at position a, both whitened; W force; N = r̃ᵀh̃, D = h̃ᵀh̃. The
 /// squared residual is
 ///
 /// ```text
@@ -578,22 +556,17 @@ impl Posterior<'_> {
 struct Segment {
     from_m: f64,
     to_m: f64,
-    /// h̃ of each channel, a polynomial of t = (a − from)/(to − from).
+    /// Polynomials of t = (a − from)/(to − from).
     influence: Vec<Polynomial>,
-    /// h̃ for the unknown force, divided by t or 1 − t where every influence is 0 at that end. There N²/D would
-    /// be 0/0, and the division does not change it.
+    /// h̃ over t or 1 − t where h̃ = 0 at that end, as N²/D would be 0/0.
     reduced: Vec<Polynomial>,
-    /// Whether `reduced` is in 1 − t.
     mirrored: bool,
-    /// Start of `reduced`: 0, or just beside an end where every sensor reads 0 and only an infinite force would fit.
     start: f64,
 }
 
-/// Share of a segment that is just beside its end.
 const BESIDE: f64 = 1e-6;
 
 impl Segment {
-    /// The segment from `from_m` to `to_m`, where `influence(channel, a)` is cubic in a.
     fn new(from_m: f64, to_m: f64, channels: usize, influence: impl Fn(usize, f64) -> f64) -> Self {
         let at = |t: f64| from_m + t * (to_m - from_m);
         let cubic = |channel: usize| {
@@ -613,7 +586,6 @@ impl Segment {
         Self { from_m, to_m, influence: polynomials, reduced, mirrored, start }
     }
 
-    /// Positions at which the squared residual is stationary, and both ends of the segment.
     fn candidates(&self, reading: &[f64], force_n: Option<f64>) -> Vec<f64> {
         let functions = if force_n.is_some() { &self.influence } else { &self.reduced };
         let (mut n, mut d) = (Polynomial::zero(), Polynomial::zero());
@@ -632,7 +604,6 @@ impl Segment {
         [start, 1.0].into_iter().chain(turns).map(place).collect()
     }
 
-    /// h̃ of every channel at `position_m`, and its derivative by the position in 1/m.
     fn influence_at(&self, position_m: f64) -> Vec<(f64, f64)> {
         let length_m = self.to_m - self.from_m;
         let t = (position_m - self.from_m) / length_m;

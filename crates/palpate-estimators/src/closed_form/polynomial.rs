@@ -1,4 +1,4 @@
-//! Polynomials of low degree, and all their real roots within an interval.
+//! Polynomials and their real roots in an interval.
 
 /// c₀ + c₁·t + c₂·t² + …
 #[derive(Clone, Debug, PartialEq)]
@@ -9,7 +9,7 @@ impl Polynomial {
         Self(vec![0.0])
     }
 
-    /// The cubic through the values at t = 0, ⅓, ⅔ and 1.
+    /// Cubic through values at t = 0, ⅓, ⅔ and 1.
     pub(super) fn cubic_through([a, b, c, d]: [f64; 4]) -> Self {
         Self(vec![
             a,
@@ -28,7 +28,6 @@ impl Polynomial {
         Self(terms.chain((self.0.len() <= 1).then_some(0.0)).collect())
     }
 
-    /// The sum with `factor` times another.
     pub(super) fn plus(&self, factor: f64, other: &Self) -> Self {
         let coefficient = |terms: &[f64], i: usize| terms.get(i).copied().unwrap_or(0.0);
         let len = self.0.len().max(other.0.len());
@@ -45,24 +44,21 @@ impl Polynomial {
         Self(product)
     }
 
-    /// The polynomial in 1 − t instead of t.
     pub(super) fn mirrored(&self) -> Self {
         let mirror = Self(vec![1.0, -1.0]);
         self.0.iter().rev().fold(Self::zero(), |sum, c| sum.times(&mirror).plus(1.0, &Self(vec![*c])))
     }
 
-    /// The polynomial divided by t; its constant, in theory 0, is dropped.
+    /// Drops the constant, 0 in theory.
     pub(super) fn over_t(&self) -> Self {
         Self(self.0.iter().skip(1).copied().chain((self.0.len() <= 1).then_some(0.0)).collect())
     }
 
-    /// The largest magnitude of a coefficient.
     pub(super) fn size(&self) -> f64 {
         self.0.iter().fold(0.0, |m: f64, c| m.max(c.abs()))
     }
 
-    /// Every root in 0 ≤ t ≤ 1 at which the sign changes, in rising order: between two neighbouring roots of the derivative the
-    /// polynomial is monotone, so bisection finds the only root there.
+    /// Roots in 0 ≤ t ≤ 1 with a change of sign, by bisection between roots of the derivative.
     pub(super) fn sign_changes(&self) -> Vec<f64> {
         if self.0.len() <= 1 || self.size() == 0.0 {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! Clean readings over the whole beam, noise against its propagation, and claims that the closed form must not make.
+//! Noise-free readings, propagated noise, and unidentifiable positions.
 
 use std::sync::LazyLock;
 
@@ -53,7 +53,6 @@ fn clean(setup: &Setup, x_m: f64, force_n: f64) -> Vec<f64> {
     sensors.map(|s| force_n * BEAM.influence(s.kind, s.position, contact)).collect()
 }
 
-/// Distance from the truth to the nearest place of the estimate, in metres.
 fn nearest_m(setup: &Setup, locator: &ClosedFormLocator, x_m: f64, force_n: f64) -> f64 {
     let estimate = locator.locate(&clean(setup, x_m, force_n));
     assert!(matches!(estimate.status, Status::Located | Status::Ambiguous), "{x_m}: {estimate:?}");
@@ -93,7 +92,8 @@ fn clean_deflections_give_every_position_at_known_force() {
         for x_mm in 1..=399 {
             let x_m = f64::from(x_mm) * 1e-3;
             let off_m = nearest_m(&setup, &locator, x_m, 3.0);
-            // One sensor at mid-span reads a maximum there; a double root has half the digits of double precision.
+            // One sensor at mid-span has its maximum there; a double root has half the digits of double
+            // precision.
             let bound_m = if count == 1 { 1e-6 } else { 1e-9 };
             assert!(off_m < bound_m, "{count} sensors, {x_mm} mm: {off_m}");
         }
@@ -124,7 +124,7 @@ fn two_strains_see_between_them_and_are_blind_outside() {
     assert!(low < 0.001 && high > 0.4 / 3.0, "{blind:?}");
 }
 
-/// Mean and standard deviation of position errors over noise, the mean propagated sd, and the share within the 95 % interval.
+/// Mean and standard deviation of position errors, mean propagated sd, and coverage of the 95 % interval.
 fn monte_carlo(setup: &Setup, x_m: f64, force_n: f64) -> (f64, f64, f64, f64) {
     let locator = fit(setup).unwrap();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
@@ -157,7 +157,8 @@ fn noise_spreads_as_much_as_was_propagated() {
     ];
     for (i, (setup, x_m, force_n)) in cases.into_iter().enumerate() {
         let (mean, spread, propagated, covered) = monte_carlo(&setup, x_m, force_n);
-        // With 2000 draws a standard deviation is known to 1.6 % and a coverage of 0.95 to 0.005.
+        // With 2000 draws the standard error of a standard deviation is 1.6 %, and of a coverage of 0.95 it
+        // is 0.005.
         assert!((spread / propagated - 1.0).abs() < 0.06, "case {i}: {spread} against {propagated}");
         assert!(mean.abs() < 0.1 * spread, "case {i}: mean {mean}, sd {spread}");
         assert!((covered - 0.95).abs() < 0.02, "case {i}: {covered}");
@@ -179,7 +180,7 @@ fn what_no_contact_explains_is_not_located() {
     assert_eq!(scales.locate(&[0.01, -0.005]).status, Status::NoContact);
     assert_eq!(scales.locate(&[-0.5, 2.5]).status, Status::OutsideSurface);
     assert_eq!(scales.locate(&[-1.0, -2.0]).status, Status::OutsideModel);
-    // Noise may move a contact at the edge beyond it.
+    // Noise may shift the estimate of a contact at an edge beyond it.
     let edge = scales.locate(&[-0.01, 3.0]);
     assert_eq!((edge.status, edge.contact.position.x_m), (Status::Located, 0.4));
 }

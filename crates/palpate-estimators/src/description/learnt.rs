@@ -1,11 +1,11 @@
-//! Structure, drift, scatter and noise that were learnt from a recording of a surface without a model, in words.
+//! Descriptions of learnt parameters of a surface without a model.
 
 use crate::influence::{DriftCourse, ForceLinearLocator, Scatter, Source, Structure};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::units::{format_count, format_length_mm};
 use palpate_numerics::regression::Kernel;
 
-/// Structure, influence functions, offsets, noise and disturbances: a line for each.
+/// Describes structure, influence functions, offsets, noise and disturbances.
 pub fn learnt(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     let channels =
         linear.channels().map(|(c, offset, noise)| format!("{}: {}", names[c], with_noise(offset, noise)));
@@ -20,13 +20,11 @@ pub fn learnt(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     lines
 }
 
-/// A value ± its noise, to three significant digits of the noise.
 fn with_noise(value: f64, noise: f64) -> String {
     let decimals = decimals(noise, 3);
     format!("{value:.decimals$} ± {noise:.decimals$}")
 }
 
-/// Decimals for `digits` significant digits of a value; 0 for the value 0.
 pub(super) fn decimals(value: f64, digits: i32) -> usize {
     if value == 0.0 {
         return 0;
@@ -34,14 +32,13 @@ pub(super) fn decimals(value: f64, digits: i32) -> usize {
     (f64::from(digits - 1) - value.abs().log10().floor()).clamp(0.0, 15.0) as usize
 }
 
-/// Structure, drift, scatter and excluded rows, for the summary of a fit.
+/// Describes structure, drift, scatter and excluded rows.
 pub fn learnt_summary(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     let mut lines = vec![structure(linear)];
     lines.extend(disturbances(linear, names));
     lines
 }
 
-/// The structure, and the reason for it.
 fn structure(linear: &ForceLinearLocator) -> String {
     let exponent = linear.response();
     if let Some(share) = linear.saturation_share() {
@@ -70,7 +67,6 @@ fn structure(linear: &ForceLinearLocator) -> String {
     }
 }
 
-/// Drift, scatter and excluded rows.
 fn disturbances(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     let by_channel = |sizes: &[(usize, f64)]| {
         let size = |(c, sd): &(usize, f64)| format!("{} by {:.*}", names[*c], decimals(*sd, 2), sd);
@@ -121,7 +117,7 @@ fn disturbances(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     lines
 }
 
-/// The warning for a recording of so many presses with hardly any repeats.
+/// Returns the warning for too few repeats.
 pub fn noise_is_hardly_told(presses: usize) -> String {
     let presses = format_count(presses as u64);
     format!(
@@ -129,7 +125,6 @@ pub fn noise_is_hardly_told(presses: usize) -> String {
     )
 }
 
-/// Rows of a recording, counted from 1.
 fn rows(from_0: &[usize]) -> String {
     let numbers: Vec<String> = from_0.iter().map(|row| (row + 1).to_string()).collect();
     format!("{} {}", if numbers.len() == 1 { "row" } else { "rows" }, numbers.join(", "))
@@ -164,7 +159,7 @@ mod tests {
         assert_eq!(with_noise(282.5181, 1.0234), "282.52 ± 1.02");
         assert_eq!(with_noise(0.000_123_4, 0.002_011), "0.00012 ± 0.00201");
         assert_eq!(with_noise(51_234.6, 1234.5), "51235 ± 1234");
-        // A walk of a few microstrain, and none.
+        // A walk of a few microstrain, and a walk of 0.
         assert_eq!([decimals(3.2e-6, 2), decimals(0.0, 2)], [7, 0]);
     }
 }

@@ -1,4 +1,4 @@
-//! Locators in words.
+//! Descriptions of locators.
 
 use super::learnt::{decimals, learnt};
 use crate::centroid::Weighing;
@@ -10,7 +10,7 @@ use crate::network::Topology;
 use palpate_mechanics::units::{format_count, format_length_mm};
 use palpate_numerics::FEWEST_FOR_95;
 
-/// A locator: its setup, what it learnt, how its estimates are checked, and the recording that it was fitted to.
+/// Describes setup, parameters, checks and recording.
 pub fn locator(locator: &Locator) -> Vec<String> {
     let provenance = &locator.provenance;
     let mut lines = vec![format!(
@@ -53,7 +53,7 @@ pub fn locator(locator: &Locator) -> Vec<String> {
     lines
 }
 
-/// The choice at held-out positions: the estimator, and by how much it is better than the next one.
+/// Describes the choice and its margin.
 pub fn choice(tried: &[Tried]) -> Option<String> {
     let figures = |one: &Tried| {
         let [error, score] = [one.mean_error_m, one.interval_score_m].map(format_length_mm);
@@ -80,7 +80,7 @@ pub fn choice(tried: &[Tried]) -> Option<String> {
     ))
 }
 
-/// The check of a locator's 95 % intervals at held-out places.
+/// Describes the interval check.
 pub fn interval_check(check: Option<&IntervalCheck>) -> Vec<String> {
     let Some(check) = check else {
         return vec![format!(

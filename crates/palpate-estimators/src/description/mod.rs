@@ -1,4 +1,4 @@
-//! Descriptions of setups, recordings and locators in words, a line for each fact.
+//! Descriptions, one line per fact.
 
 mod learnt;
 mod locator;
@@ -14,7 +14,7 @@ use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_mechanics::units::{Dimension, Quantity, format_length_mm};
 
-/// A setup: surface, sensors and force.
+/// Describes surface, sensors and force.
 pub fn setup(setup: &Setup) -> Vec<String> {
     let extent = setup.surface().extent();
     let modulus = |value| Quantity { value, dimension: Dimension::Modulus };
@@ -81,7 +81,7 @@ fn layout(layout: &Layout, extent: Extent) -> String {
     format!("{}: {}", layout.len(), names.join(separator))
 }
 
-/// Training positions, in one line.
+/// Describes the training positions in one line.
 pub fn training(training: &Training) -> String {
     let rule = match &training.arrangement {
         Arrangement::Even => "evenly".to_owned(),
@@ -97,12 +97,11 @@ pub fn training(training: &Training) -> String {
     format!("{}, {rule}, {} × each{placement}", training.count, training.repeats)
 }
 
-/// The placement of presses by hand.
 fn placement(sd_m: f64) -> String {
     format!("placement {} (standard deviation)", format_length_mm(sd_m))
 }
 
-/// A recording of a setup: rows, positions, and the range of every channel.
+/// Describes rows, positions and channel ranges.
 pub fn recording(recording: &Recording, setup: &Setup) -> Vec<String> {
     let positions = recording.distinct_positions();
     let range = |values: &mut dyn Iterator<Item = f64>| {

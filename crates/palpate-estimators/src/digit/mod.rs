@@ -1,12 +1,9 @@
-//! The flexible digit's own estimator, after Ma and his colleagues: where a bending finger is touched, how hard, and what
-//! shape it has.
+//! Maximum-likelihood position, force and shape of a flexible digit with strain gauges, after Ma and others.
 //!
-//! Strain gauges read the bending moment. Gauges between the clamp and the contact respond to it; gauges beyond it read 0. So the
-//! likelihood of a reading has one smooth piece for every stretch between neighbouring gauges. Each piece is searched by
-//! itself: a few starts, then Gauss–Newton steps on the exact elastica that never leave the stretch. Together the pieces
-//! form a posterior of position and force, with a prior that is flat over the digit's length and the logarithm of
-//! the force. A stretch has one Gaussian, cut off at its gauges. Where only one gauge responds to a contact of unknown
-//! force, it determines only the product of force and lever arm: the piece is a curve of contacts that explain the reading equally well.
+//! Gauges beyond the contact read 0, so the likelihood has one smooth piece per segment between gauges, with
+//! separate Gauss–Newton searches on the exact elastica. The posterior, with a prior flat in position and log
+//! force, has one truncated Gaussian per segment. With one responding gauge and an unknown force only force
+//! times lever arm is identifiable: a curve of contacts.
 
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -26,8 +23,7 @@ use palpate_numerics::small::Ldl;
 use palpate_numerics::watch::Cancelled;
 use palpate_numerics::{bisect, clamped_interval, holding, normal_cdf, normal_interval_95};
 
-/// The flexible digit's estimator: maximum likelihood over position and force. It needs the digit, its gauges and their
-/// noise, and does not learn from a recording.
+/// Maximum-likelihood estimator of a flexible digit, without training.
 ///
 /// ```
 /// use palpate_estimators::{arrangement::Training, digit::DigitEstimator, fit::Fit, setup::Setup};
@@ -46,14 +42,14 @@ use palpate_numerics::{bisect, clamped_interval, holding, normal_cdf, normal_int
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DigitEstimator {
-    /// Theory of bending by which the gauges read.
+    /// Theory of bending.
     pub theory: DigitTheory,
-    /// False-alarm rate: share of untouched readings that may be detected as a contact.
+    /// False-alarm rate.
     pub false_alarm_rate: FalseAlarmRate,
 }
 
 impl DigitEstimator {
-    /// An estimator with this theory of bending, and default settings otherwise.
+    /// Returns an estimator with this theory.
     pub const fn of_theory(theory: DigitTheory) -> Self {
         Self { theory, false_alarm_rate: FalseAlarmRate::DEFAULT }
     }
@@ -70,19 +66,19 @@ pub enum DigitTheory {
     Linear,
 }
 
-/// A bench that the digit's estimator does not suit.
+/// Setup that the digit estimator does not suit.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum DigitFitError {
-    /// Another kind of surface.
+    /// Surface other than a digit.
     #[error("the digit estimator needs `kind = \"digit\"` in [surface]; the surface is another one")]
     NotADigit,
-    /// A sensor other than a strain gauge.
+    /// Sensor other than a strain gauge.
     #[error("the digit estimator needs strain gauges; the layout has a {kind} sensor")]
     NotAGauge {
-        /// Quantity that the sensor measures.
+        /// Quantity of the sensor.
         kind: SensorKind,
     },
-    /// A gauge without noise.
+    /// Gauge without noise.
     #[error(
         "gauge {gauge} has neither noise nor resolution; the digit estimator weights gauges by their noise: give `noise` in [sensors]"
     )]
@@ -90,32 +86,32 @@ pub enum DigitFitError {
         /// Number of the gauge, from 1.
         gauge: usize,
     },
-    /// Too few gauges for the unknowns.
+    /// Fewer gauges than unknowns.
     #[error(
         "the digit estimator needs at least {needed} living gauges ({}); the layout has {found}",
         if *needed == 1 { "the force is known" } else { "the force is unknown" }
     )]
     TooFewGauges {
-        /// Unknowns: 1 for the position, and 1 for a force that is unknown.
+        /// Number of unknowns: position, and force where unknown.
         needed: usize,
-        /// Gauges that are not dead.
+        /// Number of enabled gauges.
         found: usize,
     },
-    /// A known force that bends the digit beyond the range of its model.
+    /// Known force beyond the range of the model.
     #[error(
         "the force is {force_n} N; a contact at the tip bears at most {most_n} N, a load F·l²/(E·I) of {}",
         Digit::MOST_LOAD
     )]
     TooMuchForce {
-        /// The force, in newtons.
+        /// Force.
         force_n: f64,
-        /// The largest, in newtons.
+        /// Upper limit.
         most_n: f64,
     },
-    /// The recording's channels are not the setup's.
+    /// Channel mismatch.
     #[error(transparent)]
     Channels(#[from] ChannelMismatch),
-    /// The fit was stopped.
+    /// Cancelled.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
@@ -158,35 +154,34 @@ impl Fit for DigitEstimator {
     }
 }
 
-/// Widest interval, as a share of the length, that counts as a place where only one gauge responds to the contact.
+/// Interval of a curve, relative to the length, of an ambiguous estimate.
 const WIDE: f64 = 0.01;
 
-/// A digit's estimator that locates; see [`DigitEstimator`].
+/// Fitted [`DigitEstimator`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DigitLocator {
-    /// The finger.
+    /// Digit.
     pub digit: Digit,
     /// Gauges.
     pub layout: Layout,
-    /// The contact's force in newtons, where it is known.
+    /// Known force.
     pub force_n: Option<f64>,
-    /// Theory of bending by which the gauges read.
+    /// Theory of bending.
     pub theory: DigitTheory,
-    /// False-alarm rate: share of untouched readings that may be detected as a contact.
+    /// False-alarm rate.
     #[serde(default)]
     pub false_alarm_rate: FalseAlarmRate,
-    /// Offset of each channel, in its SI unit; empty where the recording has no untouched row.
+    /// Offsets in SI units; empty without untouched rows.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub offsets: Vec<f64>,
 }
 
 impl DigitLocator {
-    /// The shape of the finger at an estimated contact, at `steps` + 1 points from clamp to tip; an estimate without a force leaves it
-    /// straight.
+    /// Returns the shape at `steps` + 1 points from clamp to tip; straight without a force.
     ///
-    /// The uncertainty of the shape is that of the contact, propagated by the shapes one standard deviation to either side along the
-    /// columns of the covariance's Cholesky factor.
+    /// Uncertainty is propagated by shapes one standard deviation along the columns of the covariance's
+    /// Cholesky factor.
     pub fn shape(&self, contact: &ContactEstimate, steps: usize) -> DigitShape {
         let digit = &self.digit;
         let force_n = contact.force_n.unwrap_or(0.0);
@@ -211,7 +206,7 @@ impl DigitLocator {
         DigitShape { points: (0..=steps).map(point).collect() }
     }
 
-    /// Disables a dead gauge from now on; false, without a change, when too few would remain.
+    /// Disables a gauge; false, without a change, where too few would remain.
     pub fn leave_out(&mut self, gauge: usize) -> bool {
         let needed = unknowns(1, self.force_n);
         let Some(sensor) = self.layout.sensors().get(gauge) else { return false };
@@ -224,7 +219,6 @@ impl DigitLocator {
         enough
     }
 
-    /// Gauges that are not dead.
     fn living(&self) -> impl Iterator<Item = &Sensor> {
         self.layout.sensors().iter().filter(|sensor| !sensor.channel.dead)
     }
@@ -254,12 +248,10 @@ impl DigitLocator {
     }
 }
 
-/// The shorter of two intervals.
 fn shorter(one: (f64, f64), other: (f64, f64)) -> (f64, f64) {
     if other.1 - other.0 < one.1 - one.0 { other } else { one }
 }
 
-/// Whether two pieces are two places, not the two sides of a gauge.
 fn are_apart(a: &Piece, b: &Piece) -> bool {
     let reach_m = 3.0 * (a.covariance[0].sqrt() + b.covariance[0].sqrt());
     (a.best.position_m - b.best.position_m).abs() > reach_m
@@ -291,7 +283,7 @@ impl Locate for DigitLocator {
         let rule =
             StatusRule::new(gauges.len(), unknowns(1, self.force_n), LINE_PLACES, self.false_alarm_rate);
         let is_no_contact = |misfit: f64| none_saturated && rule.is_no_contact(size, misfit);
-        // |r|² of a contact is at least 0, so that most readings of noise need no search.
+        // |r|² of a contact is at least 0, so most readings of noise need no search.
         if is_no_contact(0.0) {
             return NO_CONTACT;
         }
@@ -324,50 +316,47 @@ impl Locate for DigitLocator {
     }
 }
 
-/// Pieces with |r|² above the least by more than this have no weight: e⁻³⁰.
+/// Excess of |r|² with a weight of e⁻³⁰.
 const MOST_EXCESS: f64 = 60.0;
-/// Points of a curve of contacts that explain a reading equally well.
 const CURVE_POINTS: usize = 96;
 
-/// The posterior of position and force. The prior is flat over the position and over the logarithm of the force: a contact anywhere, and of any order
-/// of magnitude.
 struct Posterior {
-    /// Most probable first.
     pieces: Vec<Piece>,
 }
 
-/// The posterior on one stretch.
 #[derive(Clone, Debug)]
 struct Piece {
-    /// The most likely contact; for a curve, its median.
+    /// For a curve, the median.
     best: Guess,
-    /// |r|² of the best contact.
     chi_squared: f64,
-    /// Covariance of position and force: xx, xf, ff.
     covariance: [f64; 3],
-    /// Share of the posterior probability.
     probability: f64,
     log_weight: f64,
     marginal: Marginal,
 }
 
-/// Marginal distribution of the position over a stretch.
 #[derive(Clone, Debug)]
 enum Marginal {
-    /// A normal distribution, cut off at the ends of the stretch.
-    Normal { centre_m: f64, sd_m: f64, from_m: f64, to_m: f64 },
-    /// The whole probability at the best position, as the piece is cut off far out in its tail.
+    Normal {
+        centre_m: f64,
+        sd_m: f64,
+        from_m: f64,
+        to_m: f64,
+    },
+    /// The truncation leaves only the far tail.
     Point,
-    /// Along a curve: equal steps from one position to another, and the share of the probability up to the end of each.
-    Curve { from_m: f64, to_m: f64, shares: Vec<f64> },
+    Curve {
+        from_m: f64,
+        to_m: f64,
+        shares: Vec<f64>,
+    },
 }
 
 impl Posterior {
-    /// The posterior of a reading; without pieces where no contact explains any part of it.
     fn new(likelihood: &Likelihood) -> Self {
         let mut pieces: Vec<Piece> = Vec::new();
         let mut least = f64::INFINITY;
-        // From the tip on, as gauges that must read 0 rule out stretches nearer to the clamp.
+        // From tip to clamp: gauges with a required reading of 0 exclude segments nearer to the clamp.
         for stretch in stretches(likelihood.gauges, likelihood.digit.length_m()).into_iter().rev() {
             if likelihood.least_chi_squared(stretch) > least + MOST_EXCESS {
                 continue;
@@ -385,7 +374,7 @@ impl Posterior {
         posterior
     }
 
-    /// Drops pieces with a best contact that does not explain the reading, unless that is so of all; true when at least one explains it.
+    /// Drops pieces that do not explain the reading, unless none does.
     fn keep_explanations(&mut self, rule: &StatusRule) -> bool {
         let explains = |piece: &Piece| rule.is_explained(piece.chi_squared);
         let any = self.pieces.iter().any(explains);
@@ -404,10 +393,7 @@ impl Posterior {
         }
     }
 
-    /// The 95 % interval of the position, which contains the estimate.
-    ///
-    /// Beside the clamp and the tip equal tails would exclude contacts there. Of the interval with equal tails and those without a lower or an upper
-    /// tail, it is the shortest.
+    /// Shortest of equal-tailed and one-sided intervals, to include contacts beside clamp and tip.
     fn interval_95_m(&self, estimate_m: f64, length_m: f64) -> (f64, f64) {
         let quantile_m = |share: f64| self.quantile_m(share, length_m);
         let (low_m, high_m) = (quantile_m(0.025), quantile_m(0.975));
@@ -422,7 +408,6 @@ impl Posterior {
         holding(shortest, estimate_m)
     }
 
-    /// The position below which the contact lies with probability `share`, by bisection.
     fn quantile_m(&self, share: f64, length_m: f64) -> f64 {
         let below =
             |at_m: f64| self.pieces.iter().map(|piece| piece.probability * piece.below(at_m)).sum::<f64>();
@@ -431,12 +416,10 @@ impl Posterior {
 }
 
 impl Piece {
-    /// Whether only one gauge responded to the contact, so that a curve of contacts explains the reading equally well.
     fn is_curve(&self) -> bool {
         matches!(self.marginal, Marginal::Curve { .. })
     }
 
-    /// The probability that the contact lies below `at_m`, given this stretch.
     fn below(&self, at_m: f64) -> f64 {
         match &self.marginal {
             Marginal::Normal { centre_m, sd_m, from_m, to_m } => {
@@ -457,13 +440,12 @@ impl Piece {
     }
 }
 
-/// Φ(high) − Φ(low), with its digits also far out in the upper tail.
+/// Accurate in the upper tail too.
 fn normal_mass(low: f64, high: f64) -> f64 {
     if low > 0.0 { normal_cdf(-low) - normal_cdf(-high) } else { normal_cdf(high) - normal_cdf(low) }
 }
 
-/// The piece around the most likely contact on a stretch. |r|² is a parabola about the end of the next Gauss–Newton step, which may lie beyond the
-/// stretch. By Laplace's method the weight of the piece is the volume under its Gaussian within the stretch.
+/// Laplace's method with the Gaussian truncated to the segment.
 fn normal(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
     let (best, fit) = search(likelihood, stretch);
     let factors = likelihood.factors(&fit)?;
@@ -492,8 +474,7 @@ fn normal(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
     })
 }
 
-/// The piece of a stretch where only one gauge responds, for an unknown force: at every position some force explains the moment. The weight of a
-/// position is the uncertainty of the logarithm of its force.
+/// Curve of one responding gauge, weighted by the standard deviation of the log force.
 fn curve(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
     let points = curve_points(likelihood, stretch);
     let most = points.iter().map(|point| point.log_weight).fold(f64::NEG_INFINITY, f64::max);
@@ -530,17 +511,14 @@ fn curve(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
     })
 }
 
-/// A contact of a curve, which represents its step along the stretch.
 struct CurvePoint {
     guess: Guess,
     chi_squared: f64,
-    /// Variance of the force, given this position.
     force_variance: f64,
     log_weight: f64,
 }
 
-/// The best force at each position, from clamp to tip. The search begins at the far end, where the force is small, and each force
-/// begins the search for the next.
+/// From the far end, where the force is small.
 fn curve_points(likelihood: &Likelihood, stretch: Stretch) -> Vec<CurvePoint> {
     let step_m = (stretch.to_m - stretch.from_m) / CURVE_POINTS as f64;
     let mut force_n = likelihood.linear_force_n(stretch.to_m, stretch);
@@ -560,17 +538,13 @@ fn curve_points(likelihood: &Likelihood, stretch: Stretch) -> Vec<CurvePoint> {
     points
 }
 
-/// A gauge that reads within its range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Gauge {
     at_m: f64,
-    /// Standard deviation of its noise and quantisation: √(σ² + step²/12).
     sd: f64,
-    /// Reading, a strain.
     strain: f64,
 }
 
-/// Contacts to which the same gauges respond: the first `seeing` of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Stretch {
     seeing: usize,
@@ -578,9 +552,8 @@ struct Stretch {
     to_m: f64,
 }
 
-/// The gauges of a reading from clamp to tip, without dead and saturated ones.
 fn gauges(layout: &Layout, reading: &[f64], strains: &[f64]) -> Vec<Gauge> {
-    // Converters saturate at their reading, the sum of offset and strain.
+    // Converters saturate by the sum of offset and strain.
     let inside = |((sensor, read), _): &((&Sensor, &f64), f64)| {
         !sensor.channel.dead && sensor.channel.range.is_none_or(|(low, high)| low < **read && **read < high)
     };
@@ -595,25 +568,21 @@ fn gauges(layout: &Layout, reading: &[f64], strains: &[f64]) -> Vec<Gauge> {
     gauges
 }
 
-/// The stretches on which at least one gauge responds to a contact, from clamp to tip.
 fn stretches(gauges: &[Gauge], length_m: f64) -> Vec<Stretch> {
     let end = |i: usize| gauges.get(i).map_or(length_m, |gauge| gauge.at_m);
     let stretch = |i: usize| Stretch { seeing: i + 1, from_m: gauges[i].at_m, to_m: end(i + 1) };
-    // Gauges at one place have no stretch between them.
+    // Gauges at one position have no segment between them.
     (0..gauges.len()).map(stretch).filter(|it| it.to_m - it.from_m > 1e-9 * length_m).collect()
 }
 
-/// Likelihood of a reading of a digit.
 #[derive(Clone, Copy)]
 struct Likelihood<'a> {
     digit: &'a Digit,
     theory: DigitTheory,
     gauges: &'a [Gauge],
-    /// The force in newtons, where it is known.
     force_n: Option<f64>,
 }
 
-/// A contact in the search: position along the digit in metres, and force in newtons.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Guess {
     position_m: f64,
@@ -621,18 +590,16 @@ struct Guess {
 }
 
 impl Likelihood<'_> {
-    /// The largest force that is searched at a position.
     fn most_force_n(&self, position_m: f64) -> f64 {
         Digit::MOST_LOAD * self.digit.bending_stiffness() / (position_m * position_m)
     }
 
-    /// |r|² of the gauges beyond a stretch, which a contact on it does not strain: a lower bound of |r|² there.
+    /// Lower bound of |r|²: the part of the gauges beyond.
     fn least_chi_squared(&self, stretch: Stretch) -> f64 {
         self.gauges[stretch.seeing..].iter().map(|gauge| (gauge.strain / gauge.sd).powi(2)).sum()
     }
 
-    /// The fit of position and force at a guess on a stretch; the misfit is |r|², and the score and information Jᵀ·r and JᵀJ of the
-    /// whitened residual r and the model's Jacobian J.
+    /// |r|², Jᵀr and JᵀJ of the whitened residual r.
     fn fit_at(&self, guess: Guess, stretch: Stretch) -> ContactFit<2> {
         let Guess { position_m, force_n } = guess;
         let bent = match self.theory {
@@ -662,13 +629,12 @@ impl Likelihood<'_> {
         fit.mirrored()
     }
 
-    /// The factors of JᵀJ, the inverse covariance of position and force, or of the position alone where the force is known.
-    /// `None` where the reading does not determine them.
+    /// `None` for an undetermined contact.
     fn factors(&self, fit: &ContactFit<2>) -> Option<Ldl<2>> {
         Ldl::of_free(&fit.information, [true, self.force_n.is_none()])
     }
 
-    /// The force by which the linear theory explains the reading best at a position: the start of a search.
+    /// Best force of the linear theory.
     fn linear_force_n(&self, position_m: f64, stretch: Stretch) -> f64 {
         let scale = self.digit.strain_per_curvature_m() / self.digit.bending_stiffness();
         let (mut n, mut d) = (0.0, 0.0);
@@ -681,27 +647,20 @@ impl Likelihood<'_> {
     }
 }
 
-/// The step of the force alone.
 fn force_step(fit: &ContactFit<2>) -> [f64; 2] {
     let [_, [_, ff]] = fit.information;
     [0.0, if ff > 0.0 { fit.score[1] / ff } else { 0.0 }]
 }
 
-/// A guess and its fit.
 type Tried = (Guess, ContactFit<2>);
 
-/// Starting positions of the search, as shares of the stretch.
 const START_SHARES: [f64; 3] = [0.1, 0.4, 0.8];
-/// Factors of the linear theory's force at a start: a finger that bends far has shorter lever arms.
+/// Strong bending shortens the lever arms.
 const START_FORCES: [f64; 6] = [1.0, 1.4, 2.0, 3.0, 5.0, 8.0];
-/// Most steps; five to ten from a start reach the last digits.
 const MOST_STEPS: usize = 60;
-/// A step of this share of its parameter is the last one.
 const LAST_STEP: f64 = 1e-10;
-/// Most halvings of a step; a smaller one no longer reduces |r|².
 const MOST_HALVINGS: usize = 30;
 
-/// The best contact on a stretch: the lowest of the minima reached from the best force at each start.
 fn search(likelihood: &Likelihood, stretch: Stretch) -> Tried {
     let reached = START_SHARES.map(|share| {
         let position_m = stretch.from_m + share * (stretch.to_m - stretch.from_m);
@@ -712,7 +671,6 @@ fn search(likelihood: &Likelihood, stretch: Stretch) -> Tried {
     rest.into_iter().fold(first, |best, next| if next.1.misfit < best.1.misfit { next } else { best })
 }
 
-/// The best of a few forces at a position.
 fn start(likelihood: &Likelihood, stretch: Stretch, position_m: f64) -> Guess {
     let linear_n = likelihood.linear_force_n(position_m, stretch);
     let guess = |factor: f64| clamped(likelihood, Guess { position_m, force_n: factor * linear_n }, stretch);
@@ -721,7 +679,6 @@ fn start(likelihood: &Likelihood, stretch: Stretch, position_m: f64) -> Guess {
     START_FORCES.iter().map(|factor| guess(*factor)).fold(guess(1.0), better)
 }
 
-/// Goes from a guess by some kind of steps to the nearest minimum of |r|² on the stretch.
 fn refine(
     likelihood: &Likelihood,
     stretch: Stretch,
@@ -741,7 +698,7 @@ fn refine(
     best
 }
 
-/// The Gauss–Newton step (JᵀJ)⁻¹·Jᵀr, up to the end of the stretch; at an end that it would leave, the step of the force alone.
+/// (JᵀJ)⁻¹·Jᵀr up to the end of the segment; at an end, a step of the force alone.
 fn gauss_newton_step(likelihood: &Likelihood, stretch: Stretch, (guess, fit): &Tried) -> [f64; 2] {
     let Some(factors) = likelihood.factors(fit) else { return force_step(fit) };
     let [along_m, harder_n] = factors.solve(fit.score);
@@ -754,7 +711,6 @@ fn gauss_newton_step(likelihood: &Likelihood, stretch: Stretch, (guess, fit): &T
     if along_m == 0.0 { [0.0, harder_n] } else { [share * along_m, share * harder_n] }
 }
 
-/// The longest of the step, its half, its quarter and so on that makes |r|² smaller.
 fn descend(
     likelihood: &Likelihood,
     stretch: Stretch,
@@ -774,7 +730,6 @@ fn descend(
     None
 }
 
-/// The guess, clamped to the stretch and to forces that push and that the model covers.
 fn clamped(likelihood: &Likelihood, guess: Guess, stretch: Stretch) -> Guess {
     let position_m = guess.position_m.max(stretch.from_m).min(stretch.to_m);
     let force_n = likelihood.force_n.unwrap_or_else(|| {
@@ -784,33 +739,33 @@ fn clamped(likelihood: &Likelihood, guess: Guess, stretch: Stretch) -> Guess {
     Guess { position_m, force_n }
 }
 
-/// The centre line of a finger, from clamp to tip.
+/// Centre line from clamp to tip.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DigitShape {
-    /// Points, equal steps of the finger's length apart; never empty.
+    /// Points at equal steps of arc length.
     pub points: Vec<ShapePoint>,
 }
 
-/// A point of a centre line.
+/// Point of a centre line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShapePoint {
-    /// Arc length from the clamp, in metres.
+    /// Arc length from the clamp.
     pub at_m: f64,
-    /// Coordinate along the straight finger, in metres.
+    /// Coordinate along the straight digit.
     pub x_m: f64,
-    /// Coordinate across it, positive upward, in metres.
+    /// Coordinate across it, positive upward.
     pub y_m: f64,
-    /// Root mean square distance of the true point from this one, in metres; 0 where the contact's uncertainty is not known.
+    /// Root mean square position error; 0 where unknown.
     pub sd_m: f64,
 }
 
 impl DigitShape {
-    /// The tip.
+    /// Tip.
     pub fn tip(&self) -> Option<&ShapePoint> {
         self.points.last()
     }
 
-    /// The largest distance of a point from the same point of the finger's exact shape under `truth`, in metres.
+    /// Returns the largest distance from the shape under `truth`.
     pub fn distance_m(&self, digit: &Digit, truth: Contact) -> f64 {
         let exact = digit.shape(truth);
         let distance = |point: &ShapePoint| {
@@ -821,7 +776,6 @@ impl DigitShape {
     }
 }
 
-/// The columns of the Cholesky factor of the contact's covariance, each as (position, force).
 fn deviations(contact: &ContactEstimate) -> [[f64; 2]; 2] {
     let Some(uncertainty) = contact.uncertainty else { return [[0.0; 2]; 2] };
     let [xx, _, xf, _, _, ff] = uncertainty.covariance;
@@ -831,24 +785,24 @@ fn deviations(contact: &ContactEstimate) -> [[f64; 2]; 2] {
     [[xx.sqrt(), xf / xx.sqrt()], [0.0, (ff - xf * xf / xx).max(0.0).sqrt()]]
 }
 
-/// A locator by the linear theory, and the exact readings for it.
+/// Locator by the linear theory, for exact readings.
 pub struct LinearTheory<'a> {
     locator: DigitLocator,
     sensors: CleanSensors<'a>,
 }
 
 impl<'a> LinearTheory<'a> {
-    /// A locator for the bench of a digit; `None` where the linear theory does not suit its sensors.
+    /// Returns a locator; `None` for unsuitable sensors.
     pub fn new(setup: &Setup, digit: &'a Digit) -> Option<Self> {
         let unknown = setup.clone().unknown_force();
-        // The estimator does not learn from a recording, but every fit takes one.
+        // The estimator needs no training, but every fit takes a recording.
         let recording = Recording::new(setup.layout(), "", Vec::new());
         let task = FitTask::new(&unknown, &recording);
         let locator = DigitEstimator::of_theory(DigitTheory::Linear).fit_method(task).ok()?;
         Some(Self { locator, sensors: CleanSensors::new(digit, setup.layout()) })
     }
 
-    /// Errors of position, in metres, and of force, in newtons, for a contact that is read without noise; NaN for a force without an estimate.
+    /// Returns the noise-free errors of position (m) and force (N); NaN without a force.
     pub fn errors(&self, contact: Contact) -> [f64; 2] {
         let found = self.locator.locate(&self.sensors.reading(contact)).contact;
         let off_n = found.force_n.map_or(f64::NAN, |force_n| (force_n - contact.force_n).abs());

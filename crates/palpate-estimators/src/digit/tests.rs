@@ -37,22 +37,21 @@ fn clean(setup: &Setup, x_m: f64, force_n: f64) -> Vec<f64> {
     clean_reading(setup.surface().model().unwrap(), setup.layout(), contact)
 }
 
-/// Results of a locator on contacts between the second gauge and the tip.
+/// Results on contacts between the second gauge and the tip.
 #[derive(Debug, Default)]
 struct Tally {
-    /// Number of contacts, and of those with a reading of the second gauge above five standard deviations of its noise.
+    /// Number of contacts, and of those above five standard deviations at the second gauge.
     counts: [f64; 2],
-    /// Mean errors of position and force of the latter contacts, over those of an estimator at the limit.
+    /// Mean errors of position and force of the latter, over those at the Cramér–Rao bound.
     ratios: [f64; 2],
-    /// Shares of the 95 % intervals of position and force that contain the truth, for all contacts, in %.
+    /// Coverage of the 95 % intervals of position and force in %, for all contacts.
     covered: [f64; 2],
-    /// Largest distance of a point of the centre line from its true place, over all contacts, in % of the length.
+    /// Largest error of the centre line of the length.
     shape_percent: f64,
-    /// Share of the latter contacts that are `located`, in %.
+    /// Share of `located` among the latter contacts in %.
     located: f64,
 }
 
-/// Presses with simulated noise, evenly from `from_m` to the tip.
 fn tally(setup: &Setup, force_n: f64, from_m: f64, count: usize, seed: u64) -> Tally {
     let l = digit(setup).length_m();
     let share = |i: usize| (i as f64 + 0.5) / count as f64;
@@ -166,7 +165,7 @@ fn what_one_gauge_sees_alone_is_ambiguous_unless_the_force_is_known() {
     let ContactEstimate { position, force_n, uncertainty } = estimate.contact;
     let (low_m, high_m) = uncertainty.unwrap().x_95_m;
     assert!(low_m < 0.006 && high_m > 0.018 && high_m < 0.021, "{low_m} {high_m}");
-    // The moment at the gauge is determined, and so force times lever arm.
+    // A single gauge determines the moment: force times lever arm.
     assert!((force_n.unwrap() * (position.x_m - 0.004) / (2.0 * 0.010) - 1.0).abs() < 0.02);
     let known = setup.clone().known_force(2.0).unwrap();
     let estimate = locator(&known, DigitTheory::Exact).locate(&reading).unwrap();
@@ -307,7 +306,6 @@ fn benches_that_do_not_suit_are_refused_in_words() {
     insta::assert_snapshot!(shown.join("\n"));
 }
 
-/// In the linear range every estimator works: the influence functions of the digit's mechanics reach the limit too.
 #[test]
 fn for_small_forces_influence_functions_are_at_the_limit() {
     let rig = fixtures::digit(ForceDirection::Normal, 0.3);

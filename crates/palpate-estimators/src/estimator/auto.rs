@@ -1,4 +1,4 @@
-//! Choice of an estimator at held-out positions.
+//! Choice of an estimator by cross-validation.
 
 use super::trial_splits::TrialSplits;
 use super::{Estimator, FitError, Locator, contenders};
@@ -36,23 +36,22 @@ use std::borrow::Cow;
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Auto {
-    /// Kinds of the candidates; empty for all that suit the surface.
+    /// Kinds of the candidates; empty for all.
     pub only: Vec<String>,
 }
 
 impl Auto {
-    /// The default candidates on a surface without a model: those that take seconds.
+    /// Returns the fast candidates of a surface without a model.
     pub fn quick() -> Self {
         Self { only: ["influence", "gaussian-process"].map(str::to_owned).to_vec() }
     }
 }
 
 impl Estimator {
-    /// Estimators among which it chooses at held-out positions; `None` for an estimator that does not choose.
+    /// Returns the candidates of a choice.
     ///
-    /// `influence` with `structure = "auto"` chooses a structure from 19 positions on, the number from which intervals are checked. With fewer, and
-    /// in fits within folds, the evidence of the presses decides. For presses of one weight, readings in proportion to the force are the only
-    /// structure.
+    /// `influence` with `structure = "auto"` compares structures from 19 positions on; with fewer, and within
+    /// folds, log evidence decides. Presses of one force allow only proportional readings.
     pub fn candidates(&self, FitTask { setup, recording, .. }: FitTask) -> Option<Vec<Self>> {
         let all = || {
             let mut all = contenders(setup, self, recording.rows.len());
@@ -78,18 +77,16 @@ impl Estimator {
 }
 
 impl Estimator {
-    /// True for structures of influence functions that learn from presses how readings depend on the force.
     fn needs_forces(&self) -> bool {
         let Self::Influence(Influence { structure, .. }) = self else { return false };
         matches!(structure, Structure::ForceSaturating | Structure::ForceMonotone | Structure::Free)
     }
 
-    /// The choice among its candidates; `None` for an estimator without candidates. If no structure of influence functions is compared within the
-    /// limit, the result is `None` too, and the evidence of the presses decides.
+    /// Chooses a candidate; `None` without candidates, or without a compared structure in time, where log
+    /// evidence decides.
     ///
     /// # Errors
-    /// [`FitError::NoCandidate`] without a candidate; [`FitError::Choice`] when the recording has too few positions, or no estimator suits it: then
-    /// the last one's reason; [`FitError::NotInTime`] when `auto` finished none in time; and [`FitError::Cancelled`] when the watch stopped it.
+    /// [`FitError`] without a suitable candidate, for too few positions, past the limit, or cancelled.
     pub fn decide(&self, task: FitTask, limit: Option<TimeLimit>) -> Result<Option<Choice>, FitError> {
         let Some(candidates) = self.candidates(task) else { return Ok(None) };
         match choose(task, candidates, limit) {
@@ -98,23 +95,22 @@ impl Estimator {
         }
     }
 
-    /// Fits the chosen estimator, or this one without a choice. The locator keeps the choice.
+    /// Fits the chosen estimator, or this one.
     ///
     /// # Errors
-    /// [`FitError`] when the recording does not suit the setup or the method, or the watch stopped it.
+    /// [`FitError`] for an unsuitable recording or a cancellation.
     pub fn fit_decided(&self, task: FitTask, choice: Option<&Choice>) -> Result<Locator, FitError> {
         let mut locator = fit_with_interval_check(choice.map_or(self, |choice| &choice.best), task)?;
         locator.provenance.choice = choice.map_or_else(Vec::new, |choice| choice.tried.clone());
         Ok(locator)
     }
 
-    /// The chosen estimator; this one without a choice.
     pub(super) fn decided(&self, task: FitTask) -> Result<Self, FitError> {
         Ok(self.decide(task, None)?.map_or_else(|| self.clone(), |choice| choice.best))
     }
 
-    /// The estimator for an evaluation in folds. The structure of influence functions is chosen once, by all presses: the folds would choose among
-    /// the same structures at sixteen times the cost. The choice of `auto` is repeated in each fold.
+    /// Returns the estimator for an evaluation in folds. A structure is chosen once, at a sixteenth of the
+    /// cost; the choice of `auto` is repeated in each fold.
     ///
     /// # Errors
     /// As for [`Estimator::decide`].
@@ -123,20 +119,19 @@ impl Estimator {
     }
 }
 
-/// The chosen estimator, and the figures of the others.
+/// Chosen estimator and the scores of all candidates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
-    /// The estimator with the least [`Tried::score_m`], or the simplest structure that is not significantly worse.
+    /// Least [`Tried::score_m`], or the simplest structure that is not significantly worse.
     pub best: Estimator,
-    /// Estimators that were tried: the chosen one, then the others by rising score.
+    /// Candidates, the chosen one first, by rising score.
     pub tried: Vec<Tried>,
-    /// Names of those that were left out, with the reason.
+    /// Omitted candidates with reasons.
     pub left_out: Vec<(&'static str, String)>,
-    /// Greatest change of each channel by the drift that was subtracted from the held-out readings; `None` without a drift.
+    /// Largest subtracted drift of each channel.
     pub drift: Option<Vec<f64>>,
 }
 
-/// A candidate with its held-out estimates.
 struct Trial {
     estimator: Estimator,
     tried: Tried,
@@ -144,7 +139,6 @@ struct Trial {
 }
 
 impl Trial {
-    /// Rank of the structure of influence functions by its number of parameters, the simplest first; `None` for another estimator.
     fn structure_rank(&self) -> Option<usize> {
         let Estimator::Influence(Influence { structure, .. }) = self.estimator else { return None };
         match structure {
@@ -155,8 +149,8 @@ impl Trial {
         }
     }
 
-    /// True where the mean score of another is smaller by more than two standard errors over the places. The cost of an estimate is half the sum of
-    /// its error and its interval score, each over the mean of the other trial; this is the score to first order.
+    /// True where another score is less by more than two standard errors. Costs are half the sum of error and
+    /// interval score, relative to the other trial's means.
     fn is_significantly_worse_than(&self, best: &Self) -> bool {
         let [error_m, score_m] = [best.tried.mean_error_m, best.tried.interval_score_m];
         let cost = |one: &Located| {
@@ -174,8 +168,7 @@ impl Trial {
     }
 }
 
-/// Number of the chosen trial, among trials by rising score: the first; among structures the simplest that is not significantly worse. The simpler
-/// structure extrapolates to forces beyond those of the presses.
+/// Index of the choice; a simpler structure extrapolates better to other forces.
 fn chosen(trials: &[Trial]) -> usize {
     let Some(best) = trials.first() else { return 0 };
     let is_simpler = |trial: &Trial| {
@@ -186,7 +179,6 @@ fn chosen(trials: &[Trial]) -> usize {
     simpler.min_by_key(|i| trials[*i].structure_rank()).unwrap_or(0)
 }
 
-/// Figures of an estimator that was tried; `None` without intervals.
 fn figures(name: &str, evaluation: &Evaluation) -> Option<Tried> {
     Some(Tried {
         name: name.to_owned(),
@@ -196,12 +188,12 @@ fn figures(name: &str, evaluation: &Evaluation) -> Option<Tried> {
     })
 }
 
-/// The time that the choice of an estimator may take.
+/// Time limit of a choice.
 #[derive(Clone, Copy)]
 pub struct TimeLimit<'a> {
-    /// Returns seconds since any fixed moment.
+    /// Clock in seconds from any origin.
     pub clock: &'a (dyn Fn() -> f64 + Sync),
-    /// Limit in seconds; an estimator that is not finished by then is stopped and left out.
+    /// Limit, beyond which candidates are omitted.
     pub seconds: f64,
 }
 
@@ -212,14 +204,13 @@ fn is_saturating(estimator: &Estimator) -> bool {
     matches!(estimator, Estimator::Influence(Influence { structure: Structure::ForceSaturating, .. }))
 }
 
-/// Reason of an estimator that [`TimeLimit`] leaves out.
 const NOT_IN_TIME: &str = "it was not done in time";
 
-/// Subtracts from the held-out readings of splits the drift that the other presses show. Returns the greatest change of each channel, or `None` where
-/// no split has a drift.
+/// Subtracts the drift of training presses from held-out readings. Returns the largest change of each
+/// channel.
 ///
 /// # Errors
-/// [`InfluenceFitError`] where influence functions cannot be fitted to a split's presses, and when the watch stopped it.
+/// [`InfluenceFitError`] for a failed fit or a cancellation.
 pub fn take_off_drift(
     setup: &Setup,
     splits: &mut [Split],
@@ -245,11 +236,10 @@ fn subtract_drift(
     Ok(spans)
 }
 
-/// Folds of the cross-validation that chooses.
+/// Folds of the cross-validation.
 pub const CHOICE_FOLDS: usize = 5;
 
-/// The rows by which candidates are compared. Structures of one method keep their order with more than [`ReadingCheck::MOST_ROWS`] rows, so that this
-/// number is enough.
+/// [`ReadingCheck::MOST_ROWS`] rows suffice for structures of one method.
 pub(super) fn compared_rows<'a>(candidates: &[Estimator], recording: &'a Recording) -> Cow<'a, Recording> {
     if candidates.iter().all(|candidate| matches!(candidate, Estimator::Influence(_))) {
         ReadingCheck::thinned(recording)
@@ -258,8 +248,8 @@ pub(super) fn compared_rows<'a>(candidates: &[Estimator], recording: &'a Recordi
     }
 }
 
-/// Chooses among [candidates](Estimator::candidates) for a recording of a setup by cross-validation in [`CHOICE_FOLDS`] folds: the least geometric mean of mean error
-/// and interval score, and of structures the simplest that is not significantly worse. A drift that the presses show is subtracted from the held-out readings, as a tare does in use.
+/// Least geometric mean of error and interval score, or the simplest structure not significantly worse. Drift
+/// is subtracted, as by a tare.
 fn choose(task: FitTask, candidates: Vec<Estimator>, limit: Option<TimeLimit>) -> Result<Choice, FitError> {
     if candidates.is_empty() {
         return Err(FitError::NoCandidate);
@@ -269,7 +259,7 @@ fn choose(task: FitTask, candidates: Vec<Estimator>, limit: Option<TimeLimit>) -
     let is_over = || limit.is_some_and(|limit| (limit.clock)() - start_s >= limit.seconds);
     let in_time = |progress| watch.report(progress).is_ok() && !is_over();
     let limited = Watch::new(&in_time);
-    // Stopped by the caller's watch, unless the time limit was reached.
+    // Cancelled by the caller's watch, unless the time limit has passed.
     let stopped = |stopped: Option<&'static str>| match (watch.round(), limit) {
         (Ok(()), Some(TimeLimit { seconds, .. })) => FitError::NotInTime { seconds, stopped },
         _ => Cancelled.into(),
@@ -288,7 +278,7 @@ fn choose(task: FitTask, candidates: Vec<Estimator>, limit: Option<TimeLimit>) -
     {
         Ok(drift) => drift.flatten(),
         Err(error) if Cancelled::caused(&error) => return Err(stopped(None)),
-        // Without influence functions the drift is unknown; when that estimator is tried, its error gives the reason.
+        // The drift is unknown here; the trial of that estimator reports the error.
         Err(_) => {
             splits.iter_mut().for_each(|split| split.offsets = None);
             None

@@ -1,4 +1,4 @@
-//! Comparison of estimators on the same trials.
+//! Comparison of estimators on equal splits.
 
 use super::trial_splits::TrialSplits;
 use super::{Estimator, FitCost};
@@ -6,38 +6,38 @@ use crate::evaluation::{Split, TimedEvaluation};
 use crate::setup::Setup;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// Evaluation of one estimator over some splits.
+/// Evaluation of one estimator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
-    /// The estimator.
+    /// Estimator.
     pub estimator: Estimator,
-    /// The evaluation, with its times.
+    /// Evaluation and computing times.
     pub tried: TimedEvaluation,
 }
 
-/// Options of a comparison of estimators.
+/// Options of a comparison.
 #[derive(Clone, Copy)]
 pub struct CompareOptions<'a> {
     /// Seed of the fits.
     pub seed: u64,
-    /// Returns seconds since any fixed moment, for the times of fits and estimates.
+    /// Clock in seconds from any origin.
     pub clock: &'a dyn Fn() -> f64,
-    /// Reason why an estimator of this cost is not fitted; `None` to fit it.
+    /// Reason to omit an estimator of this cost.
     pub refuse: &'a dyn Fn(&Estimator, FitCost) -> Option<String>,
-    /// Watch over the comparison; it receives the name of the current estimator and the number of those done.
+    /// Watch of the current estimator and the completed number.
     pub watch: Watch<'a>,
 }
 
 /// Result of a comparison.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Compared {
-    /// Estimators that were tried, by rising mean error.
+    /// Evaluations by rising mean error.
     pub comparisons: Vec<Comparison>,
-    /// Names of those that were left out, with the reason.
+    /// Omitted estimators with reasons.
     pub left_out: Vec<(&'static str, String)>,
 }
 
-/// Fits each estimator to the training part of every trial, and locates the contacts of its judged part; unsuitable estimators are left out.
+/// Fits and evaluates each suitable estimator on every split.
 ///
 /// ```
 /// use palpate_estimators::estimator::{CompareOptions, Estimator, compare, contenders, select};
@@ -57,7 +57,7 @@ pub struct Compared {
 /// ```
 ///
 /// # Errors
-/// [`Cancelled`] when the watch stopped it.
+/// [`Cancelled`].
 pub fn compare(
     setup: &Setup,
     contenders: Vec<Estimator>,

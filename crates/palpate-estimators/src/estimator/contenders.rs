@@ -1,11 +1,10 @@
-//! Estimators that suit a bench, for comparisons and choices.
+//! Estimators that suit a setup.
 
 use super::Estimator;
 use crate::influence::{Influence, Structure};
 use crate::setup::Setup;
 
-/// The estimators that `auto` chooses from, and that a comparison shows: every contender, with the settings of `own` where the kinds are equal.
-/// Networks trained by back-propagation stop after a number of presentations that takes some seconds.
+/// Returns the suitable estimators, with `own` for its kind. Back-propagation is capped at some seconds.
 pub fn contenders(setup: &Setup, own: &Estimator, rows: usize) -> Vec<Estimator> {
     const MOST_PRESENTATIONS: usize = 20_000_000;
     let mut contenders = Estimator::contenders(setup);
@@ -27,20 +26,20 @@ pub fn contenders(setup: &Setup, own: &Estimator, rows: usize) -> Vec<Estimator>
     contenders
 }
 
-/// Names that suit no contender.
+/// Name that suits no estimator.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no estimator `{name}` suits the bench; it can be: {}", known.join(", "))]
 pub struct UnknownEstimator {
-    /// The name.
+    /// Unknown name.
     pub name: String,
-    /// Kinds of the contenders.
+    /// Valid kinds.
     pub known: Vec<&'static str>,
 }
 
-/// The contenders that `only` names by kind or by [`Estimator::name`]; all of them where it is empty.
+/// Selects estimators by kind or [`Estimator::name`]; all for an empty `only`.
 ///
 /// # Errors
-/// [`UnknownEstimator`] for a name that no contender has.
+/// [`UnknownEstimator`].
 pub fn select(mut contenders: Vec<Estimator>, only: &[String]) -> Result<Vec<Estimator>, UnknownEstimator> {
     let is_named = |contender: &Estimator, name: &str| [contender.kind(), contender.name()].contains(&name);
     if let Some(name) = only.iter().find(|name| !contenders.iter().any(|contender| is_named(contender, name)))

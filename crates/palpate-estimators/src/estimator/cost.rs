@@ -1,7 +1,7 @@
-//! The cost of a fit, estimated before it starts: memory and time by the sizes of the matrices and tables of each method.
+//! Memory and time of a fit.
 //!
-//! Times are for one core with other work; on an idle core they are up to four times too long. `cargo bench -p palpate --bench cost` measures them,
-//! and docs/validation/tables/cost.md has the results.
+//! Times are for one busy core; `cargo bench -p palpate --bench cost` measures them
+//! (docs/validation/tables/cost.md).
 
 use super::auto::compared_rows;
 use super::{CHOICE_FOLDS, Estimator, is_learnt};
@@ -20,17 +20,17 @@ use palpate_numerics::FEWEST_FOR_95;
 use palpate_numerics::regression::{INDUCING, MOST_EXACT};
 use std::collections::HashSet;
 
-/// Memory and time that a fit will take.
+/// Memory and time of a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitCost {
-    /// Memory at its peak, in bytes, besides the program itself.
+    /// Peak memory, without the program.
     pub memory_bytes: f64,
-    /// Time of one core, in seconds; an upper bound where a method may end earlier.
+    /// Time of one core; an upper bound for iterations.
     pub seconds: f64,
 }
 
 impl FitCost {
-    /// The cost with that of the check of intervals at held-out places, where the recording has enough places.
+    /// Adds the cost of the interval check.
     #[must_use]
     pub fn with_interval_check(self, recording: &Recording) -> Self {
         let places = recording.distinct_positions().len();
@@ -45,29 +45,26 @@ impl FitCost {
     }
 }
 
-/// Size of an f64.
 const NUMBER: f64 = 8.0;
-/// Multiply-adds of a product of large matrices in a second.
+/// Multiply-adds per second, large matrices.
 const PRODUCTS: f64 = 12e9;
-/// Multiply-adds of a product of narrow matrices in a second.
+/// Multiply-adds per second, narrow matrices.
 const NARROW: f64 = 5e9;
-/// Multiply-adds of a triangular solution for one vector in a second.
+/// Multiply-adds per second, triangular solution.
 const SOLVED: f64 = 2e9;
-/// Multiply-adds of loops over more than fits into the cache, in a second.
+/// Multiply-adds per second, beyond the cache.
 const LOOPS: f64 = 1e9;
 
-/// Sizes of a task.
 #[derive(Clone, Copy, Debug)]
 struct Sizes {
     rows: f64,
     channels: f64,
-    /// Distinct contacts, each with its force and its nuisance coordinates.
     presses: f64,
     nuisances: usize,
 }
 
 impl Estimator {
-    /// Memory and time of fitting to a recording of a setup.
+    /// Estimates the cost of a fit.
     pub fn fit_cost(&self, setup: &Setup, recording: &Recording) -> FitCost {
         if let Some(candidates) = self.candidates(FitTask::new(setup, recording)) {
             let compared = compared_rows(&candidates, recording);
@@ -101,7 +98,6 @@ impl Estimator {
                     / LOOPS,
             },
             Self::Network(network) => {
-                /// Seconds of a node's activation, and of a weight's use and update, in a presentation.
                 const NODE_SECONDS: f64 = 24e-9;
                 const WEIGHT_SECONDS: f64 = 0.7e-9;
                 let nodes = network.hidden.iter().sum::<usize>() as f64;
@@ -124,7 +120,6 @@ impl Estimator {
     }
 }
 
-/// Memory and time of the reading check of a learnt method.
 fn check_cost(setup: &Setup, recording: &Recording) -> FitCost {
     let recording = ReadingCheck::thinned(recording);
     match setup.surface() {
@@ -133,7 +128,6 @@ fn check_cost(setup: &Setup, recording: &Recording) -> FitCost {
     }
 }
 
-/// Seconds for the posterior of so many points, with known hyperparameters.
 fn conditioning_seconds(points: f64) -> f64 {
     if points <= MOST_EXACT as f64 {
         return points.powi(3) / 3.0 / PRODUCTS + points * points * 4e-9;
@@ -161,7 +155,6 @@ impl Sizes {
         }
     }
 
-    /// Networks by Levenberg–Marquardt: steps over Jacobians of every output, and curvatures that are factored and inverted.
     fn network_lm(&self, levenberg: &LevenbergMarquardt, setup: &Setup, recording: &Recording) -> FitCost {
         let [inputs, outputs] = network::network_size(setup, recording).unwrap_or([0, 0]);
         let widths: Vec<usize> =
@@ -177,11 +170,8 @@ impl Sizes {
         }
     }
 
-    /// A Gaussian process of so many points, their coordinates and outputs, and points of the search for its hyperparameters.
     fn process(&self, points: f64, coordinates: f64, outputs: f64, search_points: usize) -> FitCost {
-        /// Typical number of evaluations of the evidence in a search, each with a factorisation and an inverse.
         const EVALUATIONS: f64 = 20.0;
-        /// Seconds of one coordinate of two points over all evaluations.
         const PAIR_SECONDS: f64 = 1e-7;
         let searched = points.min(search_points as f64);
         let search =
@@ -212,7 +202,7 @@ impl Sizes {
         }
         if !is_free {
             let learnt = self.force_linear(extent);
-            // Functions of the readings as they are, and of the linearized ones.
+            // Functions of the readings, and of the linearized readings.
             return match influence.structure {
                 Structure::ForceSaturating => learnt.and(FitCost { memory_bytes: 0.0, ..learnt }),
                 _ => learnt,
@@ -231,14 +221,14 @@ impl Sizes {
         let kept = if self.presses <= MOST_EXACT as f64 { self.presses } else { INDUCING as f64 };
         let table = FitCost {
             memory_bytes: NUMBER * nodes * depth * (5.0 * self.channels + 16.0),
-            // Each node twice: some tables are computed again on a finer grid.
+            // Each node twice: some tables are recomputed on a finer grid.
             seconds: 2.0 * nodes * depth * (kept * (self.channels + 30.0) / LOOPS / 4.0 + 6e-5),
         };
-        // A fifth of the presses is held out from a second process.
+        // A second process is fitted without a fifth of the presses.
         process.and(FitCost { memory_bytes: 0.0, ..process }).and(table)
     }
 
-    /// Influence functions that are learnt over those of a model: every node of a table is one triangular solution.
+    /// One triangular solution per node.
     fn over_a_model(&self, surface: &dyn Surface) -> FitCost {
         let presses = self.presses.min(learning::MOST_LEARNT as f64);
         let [nodes, mixed] = sizes_over_a_model(surface.extent());
@@ -254,11 +244,9 @@ impl Sizes {
         })
     }
 
-    /// Cost of influence functions of presses with forces. Hyperparameters are searched, and two priors are judged, each by as many factors as there
-    /// are folds; each channel has one factor of its own, and residuals of every press are another. The fit is repeated without the presses that the
-    /// model does not explain, and with noise by place.
+    /// Hyperparameter search, priors with a factorisation per fold, channels, residuals; refits without
+    /// outliers and with noise by position.
     fn force_linear(&self, extent: Extent) -> FitCost {
-        /// Typical number of evaluations of the evidence in a search, and of fits to the presses.
         const EVALUATIONS: f64 = 700.0;
         const LEARNT: f64 = 2.2;
         let presses = self.presses.min(force_linear::MOST_PRESSES as f64);
@@ -267,7 +255,7 @@ impl Sizes {
         let kept = presses * (1.0 - 1.0 / force_linear::FOLDS as f64);
         let factors = 2.0 * force_linear::FOLDS as f64 * kept.powi(3) / 3.0 + presses.powi(3);
         let learning = EVALUATIONS * searched.powi(3) / 3.0 / NARROW + factors / PRODUCTS;
-        // With few presses, each position is left out of a fit once more.
+        // With few presses, one leave-one-out fit per position is added.
         let fits = if presses < force_linear::FEW { 1.0 + presses } else { 1.0 };
         FitCost {
             memory_bytes: NUMBER * (7.0 * presses * presses + 4.0 * nodes * self.channels)

@@ -1,35 +1,34 @@
-//! The locator file: JSON with a format version.
+//! Locator file: JSON with a format version.
 
 use super::Locator;
 use crate::fit::{LARGEST, LocatorFault};
 
-/// The `format` of every locator file.
 const FORMAT: &str = "palpate-locator";
 
-/// The version of the format that this palpate reads and writes.
+/// Format version that is read and written.
 pub const FORMAT_VERSION: u32 = 1;
 
-/// A locator file that cannot be read.
+/// Error of a locator file.
 #[derive(Debug, thiserror::Error)]
 pub enum LocatorFileError {
-    /// Text that is not the JSON of a locator; the error names line and column.
+    /// Invalid JSON, with line and column.
     #[error("this is not a locator file: {0}")]
     Json(#[from] serde_json::Error),
-    /// A number that is invalid in a locator; the JSON reader checks it only after the whole object around it.
+    /// Number out of range, checked after the whole object around it.
     #[error("{}", without_place(.error))]
     Number {
-        /// The number with its name and bound.
+        /// Number with its name and bound.
         error: serde_json::Error,
-        /// Line and column, from 1, of the number.
+        /// Line and column of the number, from 1.
         place: (usize, usize),
     },
-    /// JSON of another kind.
+    /// JSON of another format.
     #[error("the file's format is `{found}`; a locator's is `{FORMAT}`")]
     Format {
         /// Value in the file.
         found: String,
     },
-    /// A locator of another format version.
+    /// Unknown format version.
     #[error(
         "the locator has format version {found}; this palpate reads version {FORMAT_VERSION}: fit it again, or use the palpate that wrote it"
     )]
@@ -37,18 +36,18 @@ pub enum LocatorFileError {
         /// Value in the file.
         found: u32,
     },
-    /// Numbers that are inconsistent.
+    /// Inconsistent numbers.
     #[error("{fault}")]
     Fault {
-        /// What is wrong.
+        /// Fault.
         fault: LocatorFault,
-        /// Line and column, from 1, where they are known.
+        /// Line and column from 1, where known.
         place: Option<(usize, usize)>,
     },
-    /// A number larger than any of a surface, a sensor or a sum of their squares.
+    /// Number beyond the largest magnitude.
     #[error("{value:e} is beyond ±{LARGEST:e}, within which every number of a locator lies")]
     TooLarge {
-        /// The number.
+        /// Value of the number.
         value: f64,
         /// Line and column, from 1.
         place: (usize, usize),
@@ -56,7 +55,7 @@ pub enum LocatorFileError {
 }
 
 impl LocatorFileError {
-    /// Line and column, from 1, of the fault in the JSON.
+    /// Line and column of the error, from 1.
     pub fn place(&self) -> Option<(usize, usize)> {
         match self {
             Self::Json(error) if error.line() > 0 => Some((error.line(), error.column().max(1))),
@@ -67,7 +66,6 @@ impl LocatorFileError {
     }
 }
 
-/// First fields of every version of the file.
 #[derive(serde::Deserialize)]
 struct Heading {
     format: String,
@@ -83,7 +81,7 @@ struct File<L> {
 }
 
 impl Locator {
-    /// The locator as the text of its file.
+    /// Text of the locator file.
     ///
     /// ```
     /// use palpate_estimators::{arrangement::Training, estimator::Locator, fit::Fit, influence::Influence, setup::Setup};
@@ -98,16 +96,16 @@ impl Locator {
     /// ```
     ///
     /// # Errors
-    /// [`LocatorFileError::Json`] for a number that JSON cannot express; a fitted locator has no such number.
+    /// [`LocatorFileError::Json`] for an infinite number, which fits never give.
     pub fn to_json(&self) -> Result<String, LocatorFileError> {
         let file = File { format: FORMAT.to_owned(), format_version: FORMAT_VERSION, locator: self };
         Ok(serde_json::to_string_pretty(&file)? + "\n")
     }
 
-    /// Reads the text of a locator file.
+    /// Reads a locator file.
     ///
     /// # Errors
-    /// [`LocatorFileError`], with the place where it is known.
+    /// [`LocatorFileError`].
     pub fn from_json(text: &str) -> Result<Self, LocatorFileError> {
         let heading: Heading = serde_json::from_str(text)?;
         if heading.format != FORMAT {
@@ -126,7 +124,6 @@ impl Locator {
     }
 }
 
-/// The numbers of a JSON text, each with the byte at which it begins.
 fn numbers(text: &str) -> impl Iterator<Item = (usize, f64)> {
     let bytes = text.as_bytes();
     let mut at = 0;
@@ -148,7 +145,6 @@ fn numbers(text: &str) -> impl Iterator<Item = (usize, f64)> {
     })
 }
 
-/// Index of the byte after a string with its first character at `at`.
 fn end_of_string(bytes: &[u8], mut at: usize) -> usize {
     while let Some(byte) = bytes.get(at) {
         match byte {
@@ -161,7 +157,6 @@ fn end_of_string(bytes: &[u8], mut at: usize) -> usize {
     at
 }
 
-/// An error of the JSON; for a number out of its range, with the number's own place.
 fn at_number(error: serde_json::Error, text: &str) -> LocatorFileError {
     match place_within_object(&error, text) {
         Some(place) => LocatorFileError::Number { error, place },
@@ -169,8 +164,7 @@ fn at_number(error: serde_json::Error, text: &str) -> LocatorFileError {
     }
 }
 
-/// Line and column, from 1, of the number that an error names ("…is -0.4; it must be greater than 0"). It is the only number of this value in
-/// the object that ends at the error's place.
+/// The only such number in the object that ends at the error.
 fn place_within_object(error: &serde_json::Error, text: &str) -> Option<(usize, usize)> {
     let told = error.to_string();
     let (named, _) = told.split_once("; it must be ")?;
@@ -184,20 +178,17 @@ fn place_within_object(error: &serde_json::Error, text: &str) -> Option<(usize, 
     places.next().is_none().then(|| line_and_column(text, at))
 }
 
-/// The message of an error without the place at its end.
 fn without_place(error: &serde_json::Error) -> String {
     let told = error.to_string();
     let place = format!(" at line {} column {}", error.line(), error.column());
     told.strip_suffix(&place).unwrap_or(&told).to_owned()
 }
 
-/// The byte at line and column, both from 1.
 fn byte_at(text: &str, line: usize, column: usize) -> Option<usize> {
     let before: usize = text.split_inclusive('\n').take(line.checked_sub(1)?).map(str::len).sum();
     Some((before + column).min(text.len()))
 }
 
-/// The byte at which the object or list that ends before `end` begins; the start of the text where there is none.
 fn start_of_object(bytes: &[u8], end: usize) -> usize {
     let mut open = Vec::new();
     let (mut at, mut start) = (0, 0);
@@ -216,7 +207,7 @@ fn start_of_object(bytes: &[u8], end: usize) -> usize {
     start
 }
 
-/// Line and column, from 1, of the number at fault: the only one of this value, or the first that is too small, as a fit never writes such a number.
+/// The only such number, or the first that is too small.
 fn place_of(fault: &LocatorFault, text: &str) -> Option<(usize, usize)> {
     let mut places = numbers(text).filter(|(_, number)| number.to_bits() == fault.value().to_bits());
     let (at, _) = places.next()?;

@@ -1,4 +1,4 @@
-//! The memory limit of work, checked against an estimate before the work starts.
+//! Memory limit of tasks.
 
 use super::{Estimator, FitCost, contenders};
 use crate::recording::Recording;
@@ -6,7 +6,7 @@ use crate::setup::Setup;
 use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
 
-/// The most memory that work may use, in bytes: greater than 0.
+/// Memory limit in bytes, greater than 0.
 ///
 /// ```
 /// use palpate_estimators::estimator::MemoryLimit;
@@ -22,42 +22,42 @@ pub struct MemoryLimit {
     bytes: f64,
 }
 
-/// An invalid limit of memory.
+/// Invalid memory limit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MemoryLimitError {
-    /// The text is not a number with a unit.
+    /// Text other than a number with a unit.
     #[error("`{0}` is not a size of memory; write it as in \"2 GB\" or \"500 MB\"")]
     Text(String),
-    /// A size that is not greater than 0 and finite.
+    /// Size that is not positive and finite.
     #[error("{0} bytes of memory; it must be greater than 0, and finite")]
     Size(f64),
 }
 
-/// Work with an estimated memory above the limit.
+/// Task that exceeds the memory limit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{work} needs about {} of memory; the limit is {limit}", Size(*needed_bytes))]
 pub struct MemoryExceeded {
-    /// The work, in words.
+    /// Name of the task.
     pub work: String,
-    /// Estimated memory at its peak, in bytes.
+    /// Estimated peak memory.
     pub needed_bytes: f64,
-    /// The limit.
+    /// Memory limit.
     pub limit: MemoryLimit,
 }
 
 impl MemoryLimit {
-    /// A limit in bytes.
+    /// Returns a limit in bytes.
     ///
     /// # Errors
-    /// [`MemoryLimitError`] for a size that is not greater than 0, or not finite.
+    /// [`MemoryLimitError`] unless positive and finite.
     pub fn new(bytes: f64) -> Result<Self, MemoryLimitError> {
         if bytes.is_finite() && bytes > 0.0 { Ok(Self { bytes }) } else { Err(MemoryLimitError::Size(bytes)) }
     }
 
-    /// Refuses work with an estimated memory above the limit.
+    /// Checks the memory of a task.
     ///
     /// # Errors
-    /// [`MemoryExceeded`] for such work.
+    /// [`MemoryExceeded`].
     pub fn check(self, work: &str, needed_bytes: f64) -> Result<(), MemoryExceeded> {
         if needed_bytes <= self.bytes {
             return Ok(());
@@ -65,15 +65,15 @@ impl MemoryLimit {
         Err(MemoryExceeded { work: work.to_owned(), needed_bytes, limit: self })
     }
 
-    /// Refuses a fit with an estimated cost above the limit.
+    /// Checks the memory of a fit.
     ///
     /// # Errors
-    /// [`MemoryExceeded`] for such a fit.
+    /// [`MemoryExceeded`].
     pub fn check_fit(self, estimator: &Estimator, cost: FitCost) -> Result<(), MemoryExceeded> {
         self.check(&format!("the fit of {}", estimator.kind()), cost.memory_bytes)
     }
 
-    /// Advice for a refused fit, with the kinds of estimators that need no more memory than the limit.
+    /// Returns advice for a refused fit.
     pub fn remedy(self, refused: &Estimator, setup: &Setup, recording: &Recording) -> String {
         let others = contenders(setup, refused, recording.rows.len());
         let suits = |other: &&Estimator| {
@@ -94,7 +94,6 @@ impl MemoryLimit {
 impl FromStr for MemoryLimit {
     type Err = MemoryLimitError;
 
-    /// A number with a unit: "2 GB", "500 MB", "1.5 GiB".
     fn from_str(text: &str) -> Result<Self, MemoryLimitError> {
         const UNITS: [(&str, f64); 7] = [
             ("GiB", 1073741824.0),
@@ -120,7 +119,7 @@ impl Display for MemoryLimit {
     }
 }
 
-/// A size of memory in bytes, shown with its unit: "2.0 GB", "600 MB", "1 kB".
+/// Memory size in bytes, displayed as "2.0 GB", "600 MB", "1 kB".
 pub struct Size(pub f64);
 
 impl Display for Size {

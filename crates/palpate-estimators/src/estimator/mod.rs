@@ -1,4 +1,4 @@
-//! All estimators as one type, so that evaluations, studies, reports and listeners treat them alike.
+//! Common type of all estimators.
 
 mod auto;
 mod compare;
@@ -57,18 +57,18 @@ use crate::status::FalseAlarmRate;
 use palpate_mechanics::surface::SurfaceSpec;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// Defines the types that represent any estimator, from one list of all estimators.
+/// Common types of a list of estimators.
 macro_rules! estimators {
     ($($(#[doc = $doc:literal])* $kind:literal $variant:ident($config:ty) $method:ty, $error:ty;)*) => {
-        /// A configured method; fitting it to a recording gives a locator.
+        /// Configured method.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Estimator {
             $($(#[doc = $doc])* #[doc = concat!("(`kind = \"", $kind, "\"`).")] $variant($config),)*
-            /// Choice among the others at held-out positions (`kind = "auto"`).
+            /// Choice by cross-validation (`kind = "auto"`).
             Auto(Auto),
         }
 
-        /// The methods that can locate.
+        /// Fitted method.
         #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
         #[serde(rename_all = "kebab-case")]
         #[expect(clippy::large_enum_variant, reason = "a program has one locator, or a few")]
@@ -76,27 +76,27 @@ macro_rules! estimators {
             $($(#[doc = $doc])* #[doc = concat!("(`", $kind, "`).")] $variant($method),)*
         }
 
-        /// An estimator that cannot be fitted to a recording.
+        /// Error of a fit.
         #[derive(Clone, Debug, PartialEq, thiserror::Error)]
         pub enum FitError {
-            /// The recording's channels are not the setup's.
+            /// Channel mismatch.
             #[error(transparent)]
             Channels(#[from] ChannelMismatch),
-            /// The fit was stopped.
+            /// Cancelled.
             #[error("{0}")]
             Cancelled(#[from] Cancelled),
-            /// The time limit passed before the choice finished an estimator.
+            /// Time limit without a completed estimator.
             #[error("no estimator was done within the {seconds} s that the choice may take ({} was stopped): give it more time, or name an estimator", stopped.map_or_else(|| "the search for a drift".to_owned(), |kind| format!("`{kind}`")))]
             NotInTime {
-                /// The time limit.
+                /// Time limit.
                 seconds: f64,
-                /// The estimator that was being tried; `None` before the first.
+                /// Stopped estimator; `None` ahead of the first.
                 stopped: Option<&'static str>,
             },
-            /// The estimators that `only` names do not suit the surface.
+            /// `only` without a suitable estimator.
             #[error("no estimator that `only` names suits the surface")]
             NoCandidate,
-            /// No estimator suits the recording; contains the last one's error.
+            /// No suitable estimator; contains the last error.
             #[error("no estimator suits the recording: {0}")]
             Choice(Box<EvaluationError<FitError>>),
             $(#[doc = concat!("Why `", $kind, "` does not suit it.")]
@@ -105,10 +105,10 @@ macro_rules! estimators {
         }
 
         impl Estimator {
-            /// Every `kind` that a rig can name.
+            /// Every valid `kind`.
             pub const KINDS: &'static [&'static str] = &[$($kind,)* "auto"];
 
-            /// The `kind` under which a rig names this estimator.
+            /// `kind` in a rig.
             pub fn kind(&self) -> &'static str {
                 match self {
                     $(Self::$variant(_) => $kind,)*
@@ -144,7 +144,6 @@ macro_rules! estimators {
                 influence.drift_course(task, asked)
             }
 
-            /// Fits with a seed, watched. A learnt method gets a [`ReadingCheck`] as well.
             fn fit_without_interval_check(&self, task: FitTask) -> Result<Locator, FitError> {
                 if let Self::Auto(_) = self {
                     return self.decided(task)?.fit_without_interval_check(task);
@@ -167,7 +166,7 @@ macro_rules! estimators {
         }
 
         impl Method {
-            /// The `kind` under which a rig names its estimator.
+            /// `kind` in a rig.
             pub fn kind(&self) -> &'static str {
                 match self {
                     $(Self::$variant(_) => $kind,)*
@@ -208,13 +207,12 @@ estimators! {
     "centroid" Centroid(Centroid) CentroidLocator, CentroidFitError;
 }
 
-/// True for kinds that map a reading to a position without a model of readings: these have a [`ReadingCheck`].
+/// True for kinds without a forward model.
 pub(crate) fn is_learnt(kind: &str) -> bool {
     matches!(kind, "network" | "network-lm" | "gaussian-process" | "neighbours" | "centroid")
 }
 
 impl Estimator {
-    /// Fits the method and, where it is learnt, adds the reading check that `check` fits to the same recording.
     fn fit_beside(
         &self,
         task: FitTask,
@@ -234,15 +232,13 @@ impl Estimator {
 }
 
 impl Method {
-    /// True for a method with intervals from errors at held-out positions, reading by reading.
     fn knows_its_errors(&self) -> bool {
         matches!(self, Self::GaussianProcess(locator) if locator.widths.is_some())
     }
 }
 
 impl Estimator {
-    /// The rows that a method learns from. Rows without contact determine offset and noise, which methods that map a reading to a position do not
-    /// have.
+    /// Untouched rows determine offsets and noise, which learnt methods do not model.
     fn learnt_from<'a>(&self, recording: &'a Recording) -> Cow<'a, Recording> {
         match self {
             Self::Influence(_) | Self::ClosedForm(_) | Self::Digit(_) | Self::Auto(_) => {
@@ -252,7 +248,7 @@ impl Estimator {
         }
     }
 
-    /// Name in comparisons: the kind, with the structure where an influence estimator states one.
+    /// Name in comparisons, with the structure.
     pub fn name(&self) -> &'static str {
         let Self::Influence(Influence { structure, .. }) = self else { return self.kind() };
         match structure {
@@ -264,8 +260,7 @@ impl Estimator {
         }
     }
 
-    /// Every method that can locate on a bench, each with its default settings, the best guess first. On a surface without a model each structure of
-    /// the readings is a method of its own.
+    /// Returns the suitable methods by preference, one per structure without a model.
     pub fn contenders(setup: &Setup) -> Vec<Self> {
         let structures: &[Structure] = match setup.surface().model() {
             Some(_) => &[Structure::Auto],
@@ -291,8 +286,7 @@ impl Estimator {
         contenders
     }
 
-    /// The default estimator of a bench, where the rig names none: on a surface without a model the [quick](Auto::quick) choice, elsewhere the
-    /// default network.
+    /// Returns the default: [quick](Auto::quick) without a model, else the network.
     pub fn usual(setup: &Setup) -> Self {
         match setup.surface().model() {
             Some(_) => Self::default(),
@@ -300,10 +294,10 @@ impl Estimator {
         }
     }
 
-    /// A digit's estimator by the linear theory of bending, for comparison.
+    /// Digit estimator by the linear theory, for comparison.
     pub const LINEAR_DIGIT: Self = Self::Digit(DigitEstimator::of_theory(DigitTheory::Linear));
 
-    /// Distinct contact positions that a recording must have for fitting.
+    /// Number of positions that a fit needs.
     pub fn positions_needed(&self) -> usize {
         match self {
             Self::ClosedForm(_) | Self::Digit(_) => 1,
@@ -311,7 +305,7 @@ impl Estimator {
         }
     }
 
-    /// False-alarm rate of its locators; `None` for locators without `no_contact`, and for `auto`.
+    /// False-alarm rate of detection.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         match self {
             Self::Influence(config) => Some(config.false_alarm_rate),
@@ -321,7 +315,7 @@ impl Estimator {
         }
     }
 
-    /// Upper bound of the rounds of one fit; 0 where it is unknown.
+    /// Upper bound of rounds; 0 where unknown.
     pub fn most_rounds(&self) -> u64 {
         match self {
             Self::Network(config) => u64::from(config.training.max_epochs),
@@ -336,7 +330,7 @@ impl Default for Estimator {
     }
 }
 
-/// A locator of any estimator, as in files.
+/// Locator of any estimator, as in files.
 pub type Locator = Fitted<Method>;
 
 impl Locate for Method {
@@ -371,46 +365,46 @@ impl<M: Locate> Fitted<M>
 where
     Method: From<M>,
 {
-    /// Converts the locator into one of any estimator.
+    /// Converts the locator to the common type.
     pub fn into_locator(self) -> Locator {
         self.map(Method::from)
     }
 }
 
-/// A locator without an untouched reading.
+/// Locator without an untouched reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "a locator of kind `{kind}` has no reading of the untouched surface: its recording has no rows of force 0"
 )]
 pub struct NoBaseline {
-    /// The locator's kind.
+    /// Kind of the locator.
     pub kind: &'static str,
 }
 
-/// A channel that cannot be disabled.
+/// Error of disabling a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LeaveOutError {
-    /// The channel does not exist.
+    /// Channel that does not exist.
     #[error("channel {channel} does not exist; the locator has channels 1 to {channels}")]
     NoChannel {
-        /// Number of the named channel, from 1.
+        /// Channel number, from 1.
         channel: usize,
         /// Channels of the locator.
         channels: usize,
     },
-    /// The method needs the channel.
+    /// Method that needs every channel.
     #[error("a locator of kind `{kind}` needs every channel: fit it again without the dead one")]
     Needed {
-        /// The locator's kind.
+        /// Kind of the locator.
         kind: &'static str,
     },
-    /// The channel is the last one.
+    /// Last enabled channel.
     #[error("it is the last living channel; at least 1 must be left")]
     NoneLeft,
 }
 
 impl Locator {
-    /// Largest number of contacts of an estimate; 1 on a plane.
+    /// Largest number of contacts.
     pub fn most_contacts(&self) -> usize {
         match &self.method {
             Method::Influence(InfluenceLocator::Beam(beam)) => beam.contacts(),
@@ -418,7 +412,7 @@ impl Locator {
         }
     }
 
-    /// Shape of the surface under an estimated contact, at `steps` + 1 points; `None` for a method without shapes.
+    /// Returns the shape under an estimate at `steps` + 1 points.
     pub fn shape(&self, estimate: &Estimate, steps: usize) -> Option<DigitShape> {
         match &self.method {
             Method::Digit(digit) => Some(digit.shape(&estimate.contact, steps)),
@@ -426,10 +420,10 @@ impl Locator {
         }
     }
 
-    /// Disables a dead channel from now on, without fitting again.
+    /// Disables a channel without a new fit.
     ///
     /// # Errors
-    /// [`LeaveOutError`] when the channel does not exist, or the method needs it.
+    /// [`LeaveOutError`] for an unknown or required channel.
     pub fn leave_out(&mut self, channel: usize) -> Result<(), LeaveOutError> {
         let channels = self.setup.layout().len();
         if channel >= channels {
@@ -459,16 +453,15 @@ impl Locator {
         Ok(())
     }
 
-    /// The `kind` under which a rig names its estimator.
+    /// `kind` in a rig.
     pub fn kind(&self) -> &'static str {
         self.method.kind()
     }
 
-    /// Untouched reading of each channel, as calibration left it: the offsets of the influence functions, the mean of the
-    /// recording's rows without contact, or 0 where a model gives what a contact adds.
+    /// Untouched reading: learnt offsets, mean of untouched rows, or 0 for a model of changes.
     ///
     /// # Errors
-    /// [`NoBaseline`] without all of them.
+    /// [`NoBaseline`].
     pub fn untouched_reading(&self) -> Result<Vec<f64>, NoBaseline> {
         let offsets = match &self.method {
             Method::Influence(influence) => influence.offsets(),
@@ -483,8 +476,8 @@ impl Locator {
         known.ok_or(NoBaseline { kind: self.kind() })
     }
 
-    /// A tare of its readings, with the baseline that calibration left. When it follows, it takes the latest untouched reading where the calibration
-    /// did ([`Zero::Last`]); the first reading is untouched then.
+    /// Tare with the calibration's baseline. With [`Zero::Last`] it follows the latest untouched reading,
+    /// from the first.
     ///
     /// ```
     /// use palpate_estimators::{arrangement::Training, fit::Fit, influence::Influence, setup::Setup};
@@ -506,12 +499,12 @@ impl Locator {
     /// ```
     ///
     /// # Errors
-    /// [`NoBaseline`] where the calibration has no untouched reading.
+    /// [`NoBaseline`].
     pub fn tare(&self) -> Result<Tare<Vec<f64>>, NoBaseline> {
         let tare = Tare::new(self.untouched_reading()?);
         let channels = self.layout().len();
         let tare = match (self.setup.recording_columns().zero, &self.untouched_drift) {
-            // The calibration has no offsets: the first reading in use is the first zero, at any value.
+            // Without offsets, the first reading in use is the first zero.
             (Zero::Last, _) => tare.and_then(|tare| {
                 tare.with_last_zero().with_drift(vec![0.0; channels], vec![f64::INFINITY; channels])
             }),
@@ -524,21 +517,21 @@ impl Locator {
         tare.map_err(|_| NoBaseline { kind: self.kind() })
     }
 
-    /// Locates a reading by its own tare, which follows the baseline as [`Tare::follow`] does. Afterwards `tared` contains the tared reading.
+    /// Locates a reading by a following tare (see [`Tare::follow`]), with the result in `tared`.
     ///
     /// # Errors
-    /// [`TareError`] for another number of channels or a value that is not finite.
+    /// [`TareError`] for an invalid reading.
     pub fn locate_following(
         &self,
         tare: &mut Tare<Vec<f64>>,
         reading: &[f64],
         tared: &mut [f64],
     ) -> Result<Estimate, TareError> {
-        // A locator accepts every tared reading: the tare has checked its channels and values.
+        // The tare has checked the channels and values.
         tare.follow(reading, tared, |tared| self.locate(tared).unwrap_or_else(|_| self.anywhere()))
     }
 
-    /// The smallest detectable force of this locator, from that by noise alone: contacts must exceed the scatter of the untouched rows too.
+    /// Adds the scatter of untouched rows to the smallest detectable force.
     #[must_use]
     pub fn beyond_scatter<'a>(&self, touch: LightestTouch<'a>) -> LightestTouch<'a> {
         match &self.untouched_scatter {
@@ -547,14 +540,14 @@ impl Locator {
         }
     }
 
-    /// False-alarm rate; `None` for a method without `no_contact`.
+    /// False-alarm rate of detection.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         let of_check = || self.check.as_ref()?.false_alarm_rate();
         let of_scatter = || self.untouched_scatter.as_ref().map(|_| FalseAlarmRate::default());
         self.method.false_alarm_rate().or_else(of_check).or_else(of_scatter)
     }
 
-    /// True for a locator with forces in its estimates, known or estimated.
+    /// True for known or estimated forces.
     ///
     /// ```
     /// use palpate_estimators::{arrangement::Training, fit::Fit, network::Network, influence::Influence, setup::Setup};
@@ -579,7 +572,7 @@ impl Locator {
         }
     }
 
-    /// The influence functions of a surface without a model that are proportional to force, or to a power of it; `None` for any other locator.
+    /// Force-linear influence functions of a surface without a model.
     pub fn force_linear(&self) -> Option<&ForceLinearLocator> {
         match &self.method {
             Method::Influence(InfluenceLocator::ForceLinear(linear)) => Some(linear),
@@ -587,7 +580,7 @@ impl Locator {
         }
     }
 
-    /// The learnt influence functions, with their uncertainty; `None` for a method without any.
+    /// Learnt influence functions with uncertainty.
     pub fn influences_at_nodes(&self) -> Option<InfluencesAtNodes> {
         match &self.method {
             Method::Influence(influence) => influence.influences_at_nodes(),
@@ -595,7 +588,7 @@ impl Locator {
         }
     }
 
-    /// Setup with the learnt noise, if any, and with unused channels dead.
+    /// Setup with learnt noise and disabled unused channels.
     ///
     /// # Errors
     /// [`SetupError`] for an invalid noise.
@@ -613,7 +606,7 @@ impl Locator {
         Ok(setup)
     }
 
-    /// The weights of a network; empty for another method.
+    /// Weights of a network.
     pub fn weights(&self) -> &[f64] {
         match &self.method {
             Method::Network(network) => &network.parts().weights,
@@ -621,7 +614,7 @@ impl Locator {
         }
     }
 
-    /// Outcome of the training, for a method trained by epochs.
+    /// Outcome of training by epochs.
     pub fn training_outcome(&self) -> Option<TrainingOutcome> {
         match &self.method {
             Method::Network(network) => Some(network.parts().outcome),
@@ -631,19 +624,18 @@ impl Locator {
 }
 
 impl Locator {
-    /// Channels that read a spread load: by the fitted influence functions of an influence locator, with its offsets and noise, and
-    /// by the mechanics of the bench for any other.
+    /// Sensors of a distributed load, by fitted influence functions or by mechanics.
     ///
     /// # Errors
-    /// [`LoadSensorsError`] for a measured surface, a live sensor without noise, or a layout of dead sensors.
+    /// [`LoadSensorsError`] without a model, noise or enabled sensors.
     pub fn load_sensors(&self) -> Result<LoadSensors<'_>, LoadSensorsError> {
         self.load_sensors_watched(Watch::NONE)
     }
 
-    /// Channels that read a spread load, as of [`Locator::load_sensors`], watched while the surface is solved.
+    /// [`Locator::load_sensors`], watched.
     ///
     /// # Errors
-    /// As for [`Locator::load_sensors`] and [`LoadSensors::new_watched`].
+    /// As there, and [`LoadSensors::new_watched`].
     pub fn load_sensors_watched(&self, watch: Watch) -> Result<LoadSensors<'_>, LoadSensorsError> {
         match &self.method {
             Method::Influence(InfluenceLocator::Beam(beam)) => {
@@ -663,18 +655,18 @@ pub struct Tracking {
     likelihood: Arc<dyn Likelihood>,
 }
 
-/// A locator that cannot track moving contacts, or not with this configuration.
+/// Locator that cannot track contacts with this configuration.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NotTrackable {
-    /// The method has no likelihood of readings.
+    /// Method without a likelihood.
     #[error("a moving contact is followed by an influence locator of a surface with a model; this one is of kind `{kind}`{}", if *measured { ", on a measured surface" } else { "" })]
     Kind {
-        /// The locator's kind.
+        /// Kind of the locator.
         kind: &'static str,
-        /// Whether its surface has no model.
+        /// True for a surface without a model.
         measured: bool,
     },
-    /// The first mode of its surface is not known.
+    /// Surface with an unknown first mode.
     #[error(
         "inertia is modelled only for a beam on two simple supports; this surface has other supports: track it without a natural frequency"
     )]
@@ -682,17 +674,17 @@ pub enum NotTrackable {
 }
 
 impl Tracking {
-    /// The likelihood for tracking contacts.
+    /// Likelihood.
     pub fn likelihood(&self) -> Arc<dyn Likelihood> {
         Arc::clone(&self.likelihood)
     }
 }
 
 impl Locator {
-    /// Likelihood for a tracker of this configuration.
+    /// Returns the likelihood for a tracker.
     ///
     /// # Errors
-    /// [`NotTrackable`] for a method without a likelihood, or for a swing of a surface without known modes.
+    /// [`NotTrackable`] without a likelihood, or for inertia without known modes.
     pub fn tracking(&self, config: &TrackerConfig) -> Result<Tracking, NotTrackable> {
         if config.swing.is_some() && !matches!(self.setup.surface(), SurfaceSpec::Beam(_)) {
             return Err(NotTrackable::Mode);

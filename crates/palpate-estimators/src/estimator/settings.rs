@@ -1,4 +1,4 @@
-//! An estimator's settings in words, for reports on any method.
+//! Settings of an estimator in words.
 
 use super::{Auto, Estimator};
 use crate::digit::{DigitEstimator, DigitTheory};
@@ -10,14 +10,14 @@ use crate::setup::Setup;
 use crate::status::FalseAlarmRate;
 use palpate_mechanics::units::format_count;
 
-/// One setting of an estimator.
+/// Setting of an estimator.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
-    /// Key in a rig's `[estimator]`, or another name where a rig cannot change it.
+    /// Key in `[estimator]`, or another name.
     pub key: &'static str,
-    /// Name, in words.
+    /// Name in words.
     pub name: &'static str,
-    /// Value in words, with its unit.
+    /// Value with its unit.
     pub value: String,
 }
 
@@ -28,7 +28,7 @@ impl Setting {
 }
 
 impl Estimator {
-    /// Every setting of the estimator for a setup, in words.
+    /// Returns every setting for a setup.
     pub fn settings(&self, setup: &Setup) -> Vec<Setting> {
         match self {
             Self::Network(config) => network(config),
@@ -50,7 +50,6 @@ impl Estimator {
                 vec![Setting::new("most_neighbours", "neighbours tried, at most", config.most.to_string())]
             }
             Self::ClosedForm(config) => vec![false_alarms(config.false_alarm_rate)],
-            // They have no settings.
             Self::GaussianProcess(_) | Self::Centroid(_) => Vec::new(),
             Self::Auto(Auto { only }) if only.is_empty() => Vec::new(),
             Self::Auto(Auto { only }) => vec![Setting::new("only", "candidates", only.join(", "))],

@@ -1,4 +1,4 @@
-//! Splits on which several estimators are tried: learnt methods share the reading check of each.
+//! Splits of a comparison, with shared reading checks.
 
 use super::{Estimator, FitError, Locator, is_learnt};
 use crate::evaluation::{EvaluationError, Split, TimedEvaluation, evaluate_held_out};
@@ -9,7 +9,6 @@ use crate::setup::Setup;
 use palpate_numerics::watch::Watch;
 use std::cell::OnceCell;
 
-/// Splits on which estimators are tried, with the reading check of each, which is fitted once.
 pub(super) struct TrialSplits<'a> {
     setup: &'a Setup,
     splits: &'a [Split],
@@ -19,7 +18,6 @@ pub(super) struct TrialSplits<'a> {
     checks: Vec<OnceCell<TimedCheck>>,
 }
 
-/// A reading check, and the seconds that its fit took.
 struct TimedCheck {
     check: Option<ReadingCheck>,
     seconds: f64,
@@ -36,8 +34,7 @@ impl<'a> TrialSplits<'a> {
         Self { memo: Some(memo), ..self }
     }
 
-    /// Evaluates an estimator as [`evaluate_splits`](crate::evaluation::evaluate_splits) does. The time of a shared check counts for each estimator
-    /// with a check.
+    /// A shared check's time counts for each estimator.
     pub fn evaluate(
         &self,
         estimator: &Estimator,
@@ -48,7 +45,6 @@ impl<'a> TrialSplits<'a> {
         evaluate_held_out(&HoldOutTask { setup, splits, seed, clock, watch, memo }, fit)
     }
 
-    /// The locator of a split, and the seconds that its check took before.
     fn fit(&self, estimator: &Estimator, split: usize, task: FitTask) -> Result<(Locator, f64), FitError> {
         let known = self.checks[split].get().filter(|_| is_learnt(estimator.kind()));
         let known_s = known.map_or(0.0, |known| known.seconds);

@@ -1,4 +1,4 @@
-//! Simulated calibrations: press a setup with faulty sensors, fit, touch it, locate.
+//! Simulated calibrations and their evaluation.
 
 use super::{Evaluation, EvaluationError, Split, SplitOrigin};
 use crate::arrangement::{Training, all_over};
@@ -14,8 +14,7 @@ use palpate_mechanics::sensing::ChannelModel;
 use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Watch;
 
-/// A calibration to simulate: where a setup is pressed and how hard, whether the locator is given the force, and the contacts
-/// that it is judged by.
+/// Simulated calibration and evaluation.
 ///
 /// ```
 /// use palpate_estimators::arrangement::Training;
@@ -37,39 +36,33 @@ use palpate_numerics::watch::Watch;
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
-    /// The setup with the force of the presses.
     pressed: Setup,
-    /// The setup with the force of the contacts that are located afterwards, or with its middle.
+    /// Setup with the force of the evaluated contacts.
     touched: Setup,
-    /// Forces of these contacts in turn, as multiples of that force.
+    /// Multiples of the force, in turn.
     force_shares: &'static [f64],
-    /// The setup as the locator has it, with the force or without.
     known: Setup,
-    /// Positions of the presses, each as often as it is pressed.
     presses: Vec<Position>,
-    /// Standard deviation in each direction of the pressed place about the asked one, in metres, on a setup with imperfections.
     placement_sd_m: Option<f64>,
-    /// Positions of the contacts afterwards, each as often as it is read.
     contacts: Vec<Position>,
 }
 
-/// A locator from a simulated calibration, and its evaluation.
+/// Locator of a simulated calibration, with its evaluation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibrated<M: Locate> {
-    /// The seed of the simulation and of the fit.
+    /// Seed of the simulation and the fit.
     pub seed: u64,
-    /// The locator.
+    /// Locator.
     pub locator: Fitted<M>,
     /// Evaluation over the contacts.
     pub evaluation: Evaluation,
 }
 
-/// Touches a calibrated bench in use all over its surface, and records it, watched: for the paper's beam at every millimetre, on a plane in the middles of
-/// about 400 cells. Contacts have the force of the setup. Where that is unknown, a bench with imperfections is touched by the force of its ranges times
-/// [`Calibration::UNKNOWN_FORCES`] in turn. See [`simulate_use_watched`].
+/// Simulates contacts [all over](all_over) the surface after a calibration, watched, with the setup's force.
+/// With imperfections and an unknown force, it is that of the ranges times [`Calibration::UNKNOWN_FORCES`].
 ///
 /// # Errors
-/// [`SimulateError`] when the bench lacks a model or a force, or the watch stopped it.
+/// [`SimulateError`] without a model or a force, or for a cancellation.
 pub fn simulate_use_all_over_watched(
     setup: &Setup,
     calibration: &Provenance,
@@ -89,14 +82,14 @@ pub fn simulate_use_all_over_watched(
 }
 
 impl Calibration {
-    /// Forces of contacts in turn, as multiples of the force of the presses, by which locators without a known force are compared.
+    /// Multiples of the press force, in turn.
     pub const UNKNOWN_FORCES: [f64; 3] = [1.0, 0.5, 2.0];
 
-    /// A calibration by presses of `press_force_n`, or else of the setup's force, without positions yet. Contacts have the setup's force, or
-    /// that of the presses where the setup's force is unknown; there is one at each position of [`all_over`].
+    /// Returns a calibration without positions, of `press_force_n` or else the setup's force, with a contact
+    /// at each position of [`all_over`].
     ///
     /// # Errors
-    /// [`OutOfRange`] for a force of the presses that is not greater than 0 and finite.
+    /// [`OutOfRange`] unless positive and finite.
     pub fn new(setup: &Setup, press_force_n: Option<f64>) -> Result<Self, OutOfRange> {
         let with = |force_n| setup.clone().with_force(force_n);
         let press_force_n = press_force_n.or(setup.force_n());
@@ -111,29 +104,29 @@ impl Calibration {
         })
     }
 
-    /// A calibration at training positions, with the force of these presses.
+    /// Returns a calibration with training positions and their force.
     ///
     /// # Errors
-    /// [`SimulateError`] when the positions cannot be laid out on the surface, or for a force out of its range.
+    /// [`SimulateError`] for invalid positions or force.
     pub fn from_training(setup: &Setup, training: &Training) -> Result<Self, SimulateError> {
         let positions = training.positions(setup.surface().extent())?;
         let calibration = Self::new(setup, training.force_n)?.pressed_at(&positions, training.repeats);
         Ok(Self { placement_sd_m: training.placement_sd_m, ..calibration })
     }
 
-    /// This calibration with presses at other positions, `repeats` at each.
+    /// Sets the positions and repeats of presses.
     #[must_use]
     pub fn pressed_at(self, positions: &[Position], repeats: usize) -> Self {
         Self { presses: repeated(positions, repeats), ..self }
     }
 
-    /// This calibration judged by other contacts, with `readings` of each.
+    /// Sets the evaluated contacts and their readings.
     #[must_use]
     pub fn judged_at(self, contacts: &[Position], readings: usize) -> Self {
         Self { contacts: repeated(contacts, readings), ..self }
     }
 
-    /// This calibration judged by contacts with [`Calibration::UNKNOWN_FORCES`] in turn, where the setup's force is unknown.
+    /// Sets unknown forces of contacts to [`Calibration::UNKNOWN_FORCES`].
     #[must_use]
     pub fn at_forces_of_use(self) -> Self {
         let force_shares =
@@ -141,21 +134,21 @@ impl Calibration {
         Self { force_shares, ..self }
     }
 
-    /// This calibration for a locator without the force of its contacts.
+    /// Makes the force unknown to the locator.
     #[must_use]
     pub fn unknown_force(self) -> Self {
         Self { known: self.known.unknown_force(), ..self }
     }
 
-    /// Positions of the presses, each as often as it is pressed.
+    /// Positions of presses, repeats included.
     pub fn presses(&self) -> &[Position] {
         &self.presses
     }
 
-    /// The contacts to judge by, each as often as it is read, with their forces; they do not depend on the seed.
+    /// Evaluated contacts with repeats, equal for all seeds.
     ///
     /// # Errors
-    /// [`SimulateError::NoForce`] where neither presses nor contacts have a force.
+    /// [`SimulateError::NoForce`].
     pub fn contacts(&self) -> Result<Vec<Contact>, SimulateError> {
         let force_n = self.touched.force_n().ok_or(SimulateError::NoForce)?;
         let with_force =
@@ -163,22 +156,21 @@ impl Calibration {
         Ok(self.contacts.iter().zip(self.force_shares.iter().cycle()).map(with_force).collect())
     }
 
-    /// Recordings of the presses to fit and of the contacts to judge. Both are read by the same faulty channels: their gains and offsets are the
-    /// first draws of a seed. A reading's noise depends only on the seed and on the number of readings before it.
+    /// Simulates presses and contacts with common gains and offsets, the first draws of a seed. Noise depends
+    /// only on the seed and the number of earlier readings.
     ///
-    /// With imperfections one bench makes both recordings, one after the other: equal presses in a row are one press that is read so often, and
-    /// untouched rows stand between presses.
+    /// With imperfections, equal consecutive presses are one press, and untouched rows separate presses.
     ///
     /// # Errors
-    /// [`SimulateError`] when the setup has no model or no force, or a position lies off the surface.
+    /// [`SimulateError`] without a model or a force, or off the surface.
     pub fn simulate(&self, seed: u64) -> Result<Split, SimulateError> {
         self.simulate_watched(seed, Watch::NONE)
     }
 
-    /// Simulates the calibration and the contacts to judge by, watched.
+    /// [`Calibration::simulate`], watched.
     ///
     /// # Errors
-    /// As for [`Calibration::simulate`], and [`SimulateError::Cancelled`].
+    /// As there, and [`SimulateError::Cancelled`].
     pub fn simulate_watched(&self, seed: u64, watch: Watch) -> Result<Split, SimulateError> {
         let force_n = self.touched.force_n().ok_or(SimulateError::NoForce)?;
         let presses = self.presses.iter().map(|position| Contact { position: *position, force_n });
@@ -201,7 +193,6 @@ impl Calibration {
         Ok(Split { training, judged, offsets: None, origin: SplitOrigin::Calibration })
     }
 
-    /// Recordings of a bench with imperfections.
     fn simulate_in_time(&self, seed: u64, watch: Watch) -> Result<Split, SimulateError> {
         let presses = Press::from_rows(&contacts_at(&self.pressed, &self.presses)?);
         let mut bench = PressedBench::new(&self.pressed, &presses, seed, watch)?;
@@ -213,26 +204,26 @@ impl Calibration {
         Ok(Split { training, judged, offsets: None, origin: SplitOrigin::Calibration })
     }
 
-    /// Recordings with `count` seeds from the first on, as [`Calibration::simulate`] makes them.
+    /// Simulates `count` consecutive seeds.
     ///
     /// # Errors
-    /// [`SimulateError`] as for [`Calibration::simulate`].
+    /// As for [`Calibration::simulate`].
     pub fn trials(&self, count: u64, seed: u64) -> Result<Vec<Split>, SimulateError> {
         self.trials_watched(count, seed, Watch::NONE)
     }
 
-    /// Simulates the trials of [`Calibration::trials`], watched.
+    /// [`Calibration::trials`], watched.
     ///
     /// # Errors
-    /// As for [`Calibration::trials`], and [`SimulateError::Cancelled`].
+    /// As there, and [`SimulateError::Cancelled`].
     pub fn trials_watched(&self, count: u64, seed: u64, watch: Watch) -> Result<Vec<Split>, SimulateError> {
         (0..count).map(|k| self.simulate_watched(seed + k, watch)).collect()
     }
 
-    /// Simulates, fits and judges the method alone.
+    /// Simulates, fits and evaluates the method alone.
     ///
     /// # Errors
-    /// [`EvaluationError`] when the setup cannot be simulated or the estimator not be fitted, or the watch stopped it.
+    /// [`EvaluationError`].
     pub fn run<E: Fit>(
         &self,
         estimator: &E,
@@ -242,10 +233,10 @@ impl Calibration {
         self.run_with(seed, watch, |task| estimator.fit_alone(task))
     }
 
-    /// Simulates, gets a locator by `fit`, and judges it.
+    /// Simulates, fits by `fit` and evaluates.
     ///
     /// # Errors
-    /// [`EvaluationError`] when the setup cannot be simulated or `fit` returns an error.
+    /// [`EvaluationError`].
     pub fn run_with<M: Locate, E: std::error::Error>(
         &self,
         seed: u64,
@@ -258,11 +249,10 @@ impl Calibration {
         Ok(Calibrated { seed, evaluation: Evaluation::new(&locator, &judged)?, locator })
     }
 
-    /// Runs the calibration for some rising seeds. Without faults the presses of all seeds are alike, and the estimator fits them all at once, side by
-    /// side where it can.
+    /// Runs rising seeds; without faults the estimator fits equal presses together.
     ///
     /// # Errors
-    /// [`EvaluationError`] as for [`Calibration::run`].
+    /// As for [`Calibration::run`].
     pub fn run_many<E: Fit>(
         &self,
         estimator: &E,
@@ -283,7 +273,6 @@ impl Calibration {
         queue.into_results().into_iter().map(judge).collect()
     }
 
-    /// Whether every channel reports what its sensor reads.
     fn is_faultless(&self) -> bool {
         let channels = self.pressed.layout().sensors();
         let are_perfect = channels.iter().all(|sensor| sensor.channel == ChannelModel::default());

@@ -1,4 +1,4 @@
-//! Positions of a recording that count along another axis than the locator's: measured from the other end, or with the axes exchanged.
+//! Detection of mirrored or exchanged axes.
 
 use super::Evaluation;
 use crate::status::SIGNIFICANCE;
@@ -20,7 +20,6 @@ pub enum SurfaceMap {
 }
 
 impl SurfaceMap {
-    /// The maps of an extent: a line has no y.
     fn all_of(extent: Extent) -> &'static [Self] {
         match extent {
             Extent::Line { .. } => &[Self::MirroredX],
@@ -28,7 +27,7 @@ impl SurfaceMap {
         }
     }
 
-    /// The map as a formula.
+    /// Map as a formula.
     pub fn formula(self) -> &'static str {
         match self {
             Self::MirroredX => "x → length − x",
@@ -49,20 +48,20 @@ impl SurfaceMap {
     }
 }
 
-/// Map of the recorded positions that makes a locator's errors smaller.
+/// Map of recorded positions that reduces the errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MappedPositions {
-    /// The map.
+    /// Map.
     pub map: SurfaceMap,
-    /// Mean error as recorded, in metres.
+    /// Mean error of recorded positions.
     pub recorded_m: f64,
-    /// Mean error of mapped positions, in metres.
+    /// Mean error of mapped positions.
     pub mapped_m: f64,
 }
 
 impl Evaluation {
-    /// The map of recorded positions that explains the errors: with it the mean error is less than half, and errors are smaller at more places than
-    /// chance explains (sign test, 5 % level over all maps). `None` without such a map.
+    /// Map with less than half the mean error, significant at most positions (sign test, 5 % level over all
+    /// maps).
     pub fn mapped_positions(&self) -> Option<MappedPositions> {
         let places = self.by_position();
         let maps = SurfaceMap::all_of(self.extent);
@@ -84,7 +83,7 @@ impl Evaluation {
             });
             sums_m[0] += recorded_m;
             sums_m[1] += mapped_m;
-            // In the middle both are equal.
+            // Both errors are equal in the middle.
             better += usize::from(mapped_m < recorded_m);
             worse += usize::from(mapped_m > recorded_m);
         }

@@ -1,4 +1,4 @@
-//! Evaluation of a locator: errors by position and by portion of the surface, and the effective length.
+//! Errors of a locator.
 
 mod calibration;
 mod mapped_positions;
@@ -24,53 +24,52 @@ use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{ELLIPSE_95, mean, root_mean_square};
 use std::sync::{Mutex, PoisonError};
 
-/// True and estimated position of one reading's contact.
+/// True and estimated contact of one reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Located {
-    /// True position of the contact.
+    /// True position.
     pub truth: Position,
-    /// Force of the contact in newtons, where it is known.
+    /// True force, where known.
     pub force_n: Option<f64>,
-    /// Position that the locator gave.
+    /// Estimated position.
     pub estimate: Position,
-    /// Whether the locator's 95 % region contained the contact, where the locator has one.
+    /// True for a contact in the 95 % region.
     pub covered: Option<bool>,
-    /// Score of the locator's 95 % intervals in metres, where it has them: see [`Evaluation::interval_score_m`].
+    /// Interval score: see [`Evaluation::interval_score_m`].
     pub interval_score_m: Option<f64>,
-    /// Status of the estimate; `None` where only its position was kept.
+    /// Status of the estimate, where kept.
     pub status: Option<Status>,
-    /// Force that the locator estimated, where it did and the contact's is known.
+    /// Estimated force, where the true one is known.
     pub force: Option<LocatedForce>,
 }
 
-/// Estimated force of one reading's contact.
+/// Estimated force of one reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocatedForce {
-    /// Force that the locator gave, in newtons.
+    /// Estimate.
     pub estimate_n: f64,
-    /// Whether the 95 % interval of the estimate contains the contact's force.
+    /// True for a force in the 95 % interval.
     pub covered: bool,
 }
 
-/// Summary of the errors of estimated forces.
+/// Summary of force errors.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct ForceSummary {
     /// Number of forces.
     pub count: usize,
-    /// Mean of the absolute errors, in newtons.
+    /// Mean absolute error.
     pub average_n: f64,
-    /// Median of the absolute errors, in newtons.
+    /// Median absolute error.
     pub median_n: f64,
-    /// 95th percentile of the absolute errors, in newtons.
+    /// 95th percentile of absolute errors.
     pub p95_n: f64,
-    /// Largest absolute error, in newtons.
+    /// Largest absolute error.
     pub largest_n: f64,
-    /// Share of the 95 % intervals that contain the force, in %.
+    /// Coverage of the 95 % intervals.
     pub coverage_percent: f64,
 }
 
 impl Located {
-    /// The contact of a row, with the estimate of its reading.
     fn new(row: &Row, estimate: &Estimate, extent: Extent) -> Self {
         Self::of_contact(row.position, row.force_n, estimate, extent)
     }
@@ -92,66 +91,65 @@ impl Located {
         }
     }
 
-    /// The distance between true and estimated position, in metres.
+    /// Position error.
     pub fn error_m(&self) -> f64 {
         self.truth.distance_m(self.estimate)
     }
 }
 
-/// A locator's estimates for a recording.
+/// Estimates of a locator for a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evaluation {
-    /// The surface; percentage errors refer to its length.
+    /// Surface; percentage errors refer to its length.
     pub extent: Extent,
-    /// The estimates, in the recording's order.
+    /// Estimates in the order of the recording.
     pub located: Vec<Located>,
 }
 
-/// A part of the surface along its length, both ends included.
+/// Closed portion of the length.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Portion {
-    /// Start, in metres.
+    /// Start.
     pub from_m: f64,
-    /// End, in metres.
+    /// End.
     pub to_m: f64,
 }
 
 impl Portion {
-    /// Name in tables, in mm: "20_380" for 20–380 mm.
+    /// Name in tables: "20_380" for 20–380 mm.
     pub fn key(&self) -> String {
         format!("{}_{}", self.from_m * 1e3, self.to_m * 1e3)
     }
 
-    /// Whether a position lies in it, within a rounding error of 10⁻⁹ m.
+    /// True within 10⁻⁹ m of the portion.
     pub fn contains(&self, position: Position) -> bool {
         (self.from_m - 1e-9..=self.to_m + 1e-9).contains(&position.x_m)
     }
 }
 
-/// Summary of location errors.
+/// Summary of position errors.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct ErrorSummary {
     /// Number of estimates.
     pub count: usize,
-    /// Mean, in metres.
+    /// Mean.
     pub average_m: f64,
-    /// Median, in metres.
+    /// Median.
     pub median_m: f64,
-    /// 95th percentile, in metres.
+    /// 95th percentile.
     pub p95_m: f64,
-    /// Largest, in metres.
+    /// Maximum.
     pub largest_m: f64,
-    /// Root of the mean square, in metres.
+    /// Root mean square.
     pub rmse_m: f64,
 }
 
-/// Percentage error of the length l: e = |a − a′| / l · 100 (paper, eq. 2).
+/// Returns e = |a − a′| / l · 100 (paper, eq. 2).
 pub fn percentage_error(error_m: f64, length_m: f64) -> f64 {
     error_m / length_m * 100.0
 }
 
-/// Whether the 95 % region of an estimated contact contains `truth`: on a line the interval, on a plane the ellipse
-/// (e − t)ᵀ·C⁻¹·(e − t) ≤ [`ELLIPSE_95`].
+/// True for `truth` in the 95 % interval or ellipse (e − t)ᵀ·C⁻¹·(e − t) ≤ [`ELLIPSE_95`].
 pub(crate) fn covered(contact: &ContactEstimate, truth: Position, extent: Extent) -> Option<bool> {
     let uncertainty = contact.uncertainty?;
     if let Extent::Line { .. } = extent {
@@ -164,7 +162,6 @@ pub(crate) fn covered(contact: &ContactEstimate, truth: Position, extent: Extent
     Some(factors.is_some_and(|factors| factors.quadratic([dx, dy]) <= ELLIPSE_95))
 }
 
-/// Interval score of a contact's 95 % intervals, averaged over its coordinates.
 fn interval_score_m(contact: &ContactEstimate, truth: Position, extent: Extent) -> Option<f64> {
     let uncertainty = contact.uncertainty?;
     let x = score_of_interval(uncertainty.x_95_m, truth.x_m);
@@ -174,17 +171,17 @@ fn interval_score_m(contact: &ContactEstimate, truth: Position, extent: Extent) 
     })
 }
 
-/// Interval score u − l + 2/α·(l − x)⁺ + 2/α·(x − u)⁺ of the interval (l, u) that should contain x with the probability 1 − α = 0.95.
+/// u − l + 2/α·(l − x)⁺ + 2/α·(x − u)⁺ for α = 0.05.
 fn score_of_interval((low, high): (f64, f64), truth: f64) -> f64 {
     const ALPHA: f64 = 0.05;
     high - low + 2.0 / ALPHA * ((low - truth).max(0.0) + (truth - high).max(0.0))
 }
 
 impl Evaluation {
-    /// Locates every reading of a recording with a contact.
+    /// Locates every contact of a recording.
     ///
     /// # Errors
-    /// [`ReadingError`] when the recording's channels are not the locator's.
+    /// [`ReadingError`].
     pub fn new<M: Locate>(locator: &Fitted<M>, recording: &Recording) -> Result<Self, ReadingError> {
         let extent = locator.setup.surface().extent();
         let rows = recording.rows.iter().filter(|row| row.touches());
@@ -195,7 +192,7 @@ impl Evaluation {
     /// Locates a recording in batches, watched.
     ///
     /// # Errors
-    /// [`BatchError`] when the recording's channels are not the locator's, or the watch stopped it.
+    /// [`BatchError`].
     pub fn new_watched<M>(
         locator: &Fitted<M>,
         recording: &Recording,
@@ -214,7 +211,6 @@ impl Evaluation {
         }
         let readings: Vec<f64> = rows.iter().flat_map(|row| row.reading.iter().copied()).collect();
         let located = Mutex::new(Vec::with_capacity(rows.len()));
-        // One thread takes block after block.
         let take = |first: usize, estimates: &[Estimate]| {
             let judged = rows[first..].iter().zip(estimates);
             let judged = judged.map(|(row, estimate)| Located::new(row, estimate, extent));
@@ -224,7 +220,7 @@ impl Evaluation {
         Ok(Self { extent, located: located.into_inner().unwrap_or_else(PoisonError::into_inner) })
     }
 
-    /// The errors within a portion, or everywhere; `None` without a located contact.
+    /// Returns the errors in a portion, or everywhere.
     pub fn summary(&self, portion: Option<Portion>) -> Option<ErrorSummary> {
         let inside = |located: &&Located| portion.is_none_or(|portion| portion.contains(located.truth));
         let errors = sorted_errors_m(self.located.iter().filter(inside));
@@ -238,21 +234,20 @@ impl Evaluation {
         })
     }
 
-    /// Share of the contacts with an error of at most `tolerance_m`, in %. With contacts evenly along the surface it is
-    /// the paper's effective length.
+    /// Returns the share of errors up to `tolerance_m`, the paper's effective length.
     pub fn effective_percent(&self, tolerance_m: f64) -> f64 {
         let good = self.located.iter().filter(|located| located.error_m() <= tolerance_m).count();
         100.0 * good as f64 / self.located.len() as f64
     }
 
-    /// Share of the 95 % regions that contain their contact, in %; `None` for a locator without regions.
+    /// Coverage of the 95 % regions.
     pub fn coverage_percent(&self) -> Option<f64> {
         let told: Vec<bool> = self.located.iter().filter_map(|located| located.covered).collect();
         let held = told.iter().filter(|covered| **covered).count();
         (!told.is_empty()).then(|| 100.0 * held as f64 / told.len() as f64)
     }
 
-    /// Share of the estimates with each status, in %, in the order of [`Status::ALL`]; `None` where statuses were not kept.
+    /// Share of each status in %, in the order of [`Status::ALL`].
     pub fn status_percents(&self) -> Option<Vec<(Status, f64)>> {
         let statuses: Option<Vec<Status>> = self.located.iter().map(|located| located.status).collect();
         let statuses = statuses.filter(|statuses| !statuses.is_empty())?;
@@ -263,7 +258,7 @@ impl Evaluation {
         Some(Status::ALL.into_iter().map(percent).collect())
     }
 
-    /// Errors of the estimated forces; `None` where the locator estimates no force, or the contacts' forces are unknown.
+    /// Errors of estimated forces.
     pub fn force_summary(&self) -> Option<ForceSummary> {
         let forces: Vec<(f64, bool)> = self
             .located
@@ -286,11 +281,10 @@ impl Evaluation {
         })
     }
 
-    /// Mean interval score of the 95 % intervals, in metres: narrow intervals that contain the contact are good ones, and the score is least on
-    /// average for the true quantiles (Gneiting and Raftery, J. Am. Stat. Assoc. 102, 2007, eq. 43).
+    /// Mean 95 % interval score, least for the true quantiles (Gneiting and Raftery, J. Am. Stat. Assoc. 102,
+    /// 2007, eq. 43).
     ///
-    /// A locator without intervals is judged by the best intervals of one width everywhere about its estimates: the 95th percentile
-    /// of its errors to either side. `None` without a located contact.
+    /// Without intervals: constant ones, ± the 95th percentile of errors.
     pub fn interval_score_m(&self) -> Option<f64> {
         let told: Vec<f64> = self.located.iter().filter_map(|located| located.interval_score_m).collect();
         if !told.is_empty() && told.len() == self.located.len() {
@@ -302,14 +296,13 @@ impl Evaluation {
         Some(mean(scores))
     }
 
-    /// The median error of the contacts in each cell, in metres; NaN for a cell without contacts.
+    /// Returns the median error by cell; NaN for an empty one.
     pub fn median_by_cell_m(&self, cells: &Cells) -> Vec<f64> {
         let median = |cell: Vec<&Located>| percentile(&sorted_errors_m(cell), 50.0).unwrap_or(f64::NAN);
         self.by_cell(cells).into_iter().map(median).collect()
     }
 
-    /// The mean position and the median error of the contacts in each of `count` equal stretches along the surface, in metres; no entry
-    /// for a stretch without contacts.
+    /// Returns mean position and median error in each of `count` equal sections with contacts.
     pub fn median_by_stretch_m(&self, count: usize) -> Vec<(f64, f64)> {
         let extent = self.extent.along_x();
         let point = |stretch: Vec<&Located>| {
@@ -328,13 +321,13 @@ impl Evaluation {
         parts
     }
 
-    /// The 1st to the 100th percentile of the errors, in metres; empty without a located contact.
+    /// 1st to 100th percentile of errors.
     pub fn percentiles_m(&self) -> Vec<(u32, f64)> {
         let errors = sorted_errors_m(&self.located);
         (1..=100).filter_map(|percent| Some((percent, percentile(&errors, f64::from(percent))?))).collect()
     }
 
-    /// The estimates at each distinct position, by x and then y.
+    /// Estimates by position.
     pub fn by_position(&self) -> Vec<(Position, Self)> {
         let mut sorted = self.located.clone();
         sorted.sort_by(|a, b| a.truth.cmp_by_x_then_y(&b.truth));
@@ -350,16 +343,15 @@ fn sorted_errors_m<'a>(located: impl IntoIterator<Item = &'a Located>) -> Vec<f6
     errors
 }
 
-/// Share of the length at either end, and of the width, where left and right cannot be distinguished at usual noise.
+/// Ill-conditioned share of the length and width at each end.
 const ENDS: f64 = 1.0 / 80.0;
-/// Largest limit that counts, as a share of the length: the limit is a bound for small errors, and no estimator reaches a larger one.
+/// Relative to the length; larger bounds are not attained.
 const LARGE_LIMIT: f64 = 1.0 / 200.0;
-/// The largest limit that counts on a plane, where both directions share the readings.
+/// Two coordinates share the information.
 const LARGE_LIMIT_ON_A_PLANE: f64 = 1.0 / 20.0;
 
-/// Mean error over the limit's mean error, for the bench's noise; `None` where the limit does not exist. It counts contacts
-/// at least 1/80 of the length from both ends, on a plane also of the width from both sides, where the limit is at most
-/// 1/200 of the length, on a plane 1/20.
+/// Returns the mean error over the mean Cramér–Rao bound, without contacts within 1/80 of an end or side, and
+/// without bounds above 1/200 of the length (plane: 1/20).
 pub fn limit_ratio(setup: &Setup, evaluation: &Evaluation) -> Option<f64> {
     let limit = setup.cramer_rao_bound().ok()?;
     let extent = setup.surface().extent();
@@ -387,24 +379,24 @@ pub fn limit_ratio(setup: &Setup, evaluation: &Evaluation) -> Option<f64> {
     (bound_m > 0.0).then(|| error_m / bound_m)
 }
 
-/// Median, 5th and 95th percentile of a figure over many seeds.
+/// Median, 5th and 95th percentile over seeds.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Quantiles {
-    /// Half of the seeds lie below.
+    /// 50th percentile.
     pub median: f64,
-    /// One in twenty lies below.
+    /// 5th percentile.
     pub p05: f64,
-    /// One in twenty lies above.
+    /// 95th percentile.
     pub p95: f64,
 }
 
 impl Quantiles {
-    /// These quantiles in another unit: each is multiplied by `factor`.
+    /// Multiplies each quantile by `factor`.
     pub fn scaled(self, factor: f64) -> Self {
         Self { median: self.median * factor, p05: self.p05 * factor, p95: self.p95 * factor }
     }
 
-    /// The quantiles of some values, in any order; `None` without values.
+    /// Returns the quantiles of values in any order.
     pub fn from_values(mut values: Vec<f64>) -> Option<Self> {
         values.sort_by(f64::total_cmp);
         Some(Self {
@@ -415,21 +407,21 @@ impl Quantiles {
     }
 }
 
-/// An evaluation over some splits together, and the time it took.
+/// Evaluation over splits, with computing times.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimedEvaluation {
-    /// The estimates.
+    /// Estimates.
     pub evaluation: Evaluation,
-    /// Mean time of a fit, by the caller's clock.
+    /// Mean time of a fit.
     pub fit_seconds: f64,
-    /// Mean time of an estimate in nanoseconds, by the caller's clock.
+    /// Mean time of an estimate.
     pub locate_ns: f64,
 }
 
-/// Fits an estimator to the training part of each split and locates the contacts of its judged part. `clock` returns seconds since any fixed moment.
+/// Fits and evaluates an estimator on each split, with a `clock` in seconds.
 ///
 /// # Errors
-/// [`EvaluationError`] when the estimator does not suit the setup or a recording, or the watch stopped it.
+/// [`EvaluationError`].
 pub fn evaluate_splits<E: Fit>(
     setup: &Setup,
     estimator: &E,
@@ -442,7 +434,6 @@ pub fn evaluate_splits<E: Fit>(
     evaluate_held_out(&HoldOutTask { setup, splits, seed, clock, watch, memo: None }, fit)
 }
 
-/// Evaluates the locators that `fit` gives for splits; see [`HoldOutTask::run`].
 pub(crate) fn evaluate_held_out<M: Locate, E: std::error::Error>(
     task: &HoldOutTask,
     fit: impl Fn(usize, FitTask) -> Result<(Fitted<M>, f64), E>,
@@ -469,19 +460,19 @@ pub(crate) fn evaluate_held_out<M: Locate, E: std::error::Error>(
     })
 }
 
-/// An estimator that cannot be evaluated.
+/// Error of an evaluation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EvaluationError<E: std::error::Error + 'static> {
-    /// The setup cannot be simulated.
+    /// Failed simulation.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
     /// Too few positions for the folds.
     #[error(transparent)]
     Positions(#[from] TooFewPositions),
-    /// The estimator does not fit.
+    /// Failed fit.
     #[error(transparent)]
     Fit(E),
-    /// A reading does not suit the locator.
+    /// Invalid reading.
     #[error(transparent)]
     Reading(#[from] ReadingError),
 }
@@ -492,8 +483,8 @@ impl<E: From<Cancelled> + std::error::Error + 'static> From<Cancelled> for Evalu
     }
 }
 
-/// Fits an estimator to each fold's training rows and locates the held-out ones; returns the estimates of all folds together. Folds are by position,
-/// see [`Recording::folds`](crate::recording::Recording::folds). An estimator that chooses among others chooses without the held-out rows.
+/// Returns held-out estimates by position (see [`Recording::folds`](crate::recording::Recording::folds)),
+/// with any choice of estimator in each fold.
 ///
 /// ```
 /// use palpate_estimators::{arrangement::Training, evaluation::cross_validate, fit::FitTask, influence::Influence, setup::Setup};
@@ -508,7 +499,7 @@ impl<E: From<Cancelled> + std::error::Error + 'static> From<Cancelled> for Evalu
 /// ```
 ///
 /// # Errors
-/// [`EvaluationError`] when a fold cannot be fitted, or the watch stopped it.
+/// [`EvaluationError`].
 pub fn cross_validate<E: Fit>(
     estimator: &E,
     task: FitTask,

@@ -1,8 +1,6 @@
-//! Known errors of made-up estimates.
-
 use super::*;
 
-/// Ten contacts along 100 mm, the k-th located k/2 mm too far right.
+/// Ten contacts along 100 mm; the error of the k-th is k/2 mm to the right.
 fn evaluation() -> Evaluation {
     let located = (1..=10).map(|k| {
         let truth = Position::along(f64::from(k) * 0.01 - 0.005);
@@ -100,7 +98,8 @@ fn intervals_score_by_their_width_and_forty_times_what_they_miss() {
         located.interval_score_m = Some(1e-3 * i as f64);
     }
     close(told.interval_score_m().unwrap(), 4.5e-3);
-    // Without intervals, one width for all: the 95th percentile of the errors, 4.775 mm, misses the last by 0.225 mm.
+    // Without intervals the width is constant: the 95th percentile, 4.775 mm, is 0.225 mm below the last
+    // error.
     close(evaluation().interval_score_m().unwrap(), 2.0 * 4.775e-3 + 40.0 * 0.225e-3 / 10.0);
 }
 
@@ -140,7 +139,7 @@ fn positions_that_count_from_the_other_end_or_along_other_axes_are_recognised() 
     let other_side = |at: Position| Position { y_m: 0.06 - at.y_m, ..at };
     assert_eq!(mapped(line, &|at| at), None);
     assert_eq!(mapped(plane, &|at| at), None);
-    // Random errors do not show a map.
+    // Random errors show no map.
     assert_eq!(mapped(line, &|at| Position::along((at.x_m * 7.0) % 0.1)), None);
     assert_eq!(mapped(line, &other_end), Some((SurfaceMap::MirroredX, true)));
     assert_eq!(mapped(plane, &other_end), Some((SurfaceMap::MirroredX, true)));

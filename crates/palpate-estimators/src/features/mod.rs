@@ -1,32 +1,27 @@
-//! Features of a reading for inverse methods: its channels, or quantities that do not depend on the load.
+//! Features of a reading for inverse methods.
 
 use crate::fit::LocatorFault;
 use crate::recording::{Recording, is_one_force};
 use crate::setup::Setup;
 use palpate_numerics::mean_and_variance;
 
-/// Kind of features that a reading is turned into.
+/// Kind of features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FeatureKind {
-    /// The readings themselves.
+    /// Readings.
     Readings,
-    /// r/‖r‖ and ln ‖r‖. Where readings are proportional to the force, r/‖r‖ does not change with it, and ln ‖r‖ measures
-    /// the size of the reading.
+    /// r/‖r‖, independent of the force for proportional readings, and ln ‖r‖.
     LoadInvariant,
-    /// r/‖r‖ alone, for presses of one force: ln ‖r‖ would determine the place of contacts of that force, and mislead for other forces.
+    /// r/‖r‖ alone, as ln ‖r‖ from one force misleads at others.
     Direction,
-    /// ln r of every channel, where all readings are greater than 0: channels that grow as different powers of the force or the depth, such as times
-    /// beside pressures, then differ by sums.
+    /// ln r of positive readings, for channels of different powers of the force.
     Logarithms,
 }
 
 impl FeatureKind {
-    /// Kinds that suit the presses of a recording. The method compares them and chooses one.
-    ///
-    /// For a known force these are the readings themselves, and r/‖r‖ with ln ‖r‖. Near a support all readings are almost 0, so that those of one end
-    /// are close to those of another, and only their proportions distinguish the ends. For an unknown force they are features that do not depend on
-    /// the load, and logarithms where all readings have one.
+    /// Returns the kinds to compare: readings and r/‖r‖ with ln ‖r‖ for a known force, else load-invariant
+    /// features and logarithms. Only proportions distinguish the ends of a beam.
     pub fn contenders(setup: &Setup, recording: &Recording) -> Vec<Self> {
         if setup.force_n().is_some() {
             return vec![Self::Readings, Self::LoadInvariant];
@@ -36,7 +31,7 @@ impl FeatureKind {
         std::iter::once(Self::load_invariant(setup, recording)).chain(logarithms).collect()
     }
 
-    /// Features that do not depend on the load. They include the size of a reading, unless all presses have one force and contacts may have others.
+    /// Returns the load-invariant kind, without ln ‖r‖ for presses of one force and unknown forces.
     pub fn load_invariant(setup: &Setup, recording: &Recording) -> Self {
         let forces_n: Option<Vec<f64>> =
             recording.rows.iter().filter(|row| row.touches()).map(|row| row.force_n).collect();
@@ -45,42 +40,41 @@ impl FeatureKind {
     }
 }
 
-/// A recording with constant readings.
+/// Recording of constant readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("all {channels} channels of the recording are constant over its {rows} rows; at least 1 must vary")]
 pub struct NoFeatures {
     /// Channels of the recording.
     pub channels: usize,
-    /// Rows.
+    /// Rows of the recording.
     pub rows: usize,
 }
 
-/// Standardized features of a reading: (source − centre)/spread, so that each has mean 0 and variance 1 over the recording. Constant channels and
-/// features are left out.
+/// Standardized features (source − centre)/spread, without constant ones.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Features {
-    /// Kind of features that a reading is turned into.
+    /// Kind of features.
     pub kind: FeatureKind,
-    /// The channels in use.
+    /// Channels in use.
     pub channels: Vec<ChannelScale>,
-    /// ‖r‖ that stands for a reading of zeros; greater than 0.
+    /// Least ‖r‖; greater than 0.
     pub least_norm: f64,
-    /// The features, in order.
+    /// Features in order.
     pub features: Vec<Feature>,
 }
 
-/// Divisor of a channel before norms are taken, so that channels of different kinds have comparable numbers.
+/// Divisor of a channel, for comparable kinds.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelScale {
-    /// Which channel of a reading, from 0.
+    /// Channel of a reading, from 0.
     pub channel: usize,
-    /// Root mean square of all channels of its kind, in their unit; greater than 0.
+    /// Root mean square of its kind; greater than 0.
     pub divisor: f64,
 }
 
-/// One feature.
+/// Standardized feature.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Feature {
@@ -96,22 +90,21 @@ pub struct Feature {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FeatureSource {
-    /// One of [`Features::channels`], from 0: r, r/‖r‖ where features are load-invariant, or ln r.
+    /// r, r/‖r‖ or ln r by index in [`Features::channels`].
     Channel(usize),
     /// ln ‖r‖.
     LogNorm,
 }
 
-/// Least norm, or least reading before its logarithm, as a share of the least in the recording; a smaller one counts as this.
+/// Lower bound of norms and readings, relative to the least.
 const LEAST_NORM: f64 = 1e-3;
-/// A spread below this share of the largest magnitude is rounding.
 const ROUNDING: f64 = 1e-12;
 
 impl Features {
-    /// Fixes the features of a recording of finite readings.
+    /// Computes the features of a recording.
     ///
     /// # Errors
-    /// [`NoFeatures`] when no channel varies.
+    /// [`NoFeatures`] for constant channels.
     pub fn fit(kind: FeatureKind, recording: &Recording) -> Result<Self, NoFeatures> {
         let rows = recording.rows.len();
         let none = NoFeatures { channels: recording.channels.len(), rows };
@@ -135,12 +128,12 @@ impl Features {
         self.features.len()
     }
 
-    /// Whether the list of features is empty, which fitting never returns.
+    /// True without features, which [`Features::fit`] excludes.
     pub fn is_empty(&self) -> bool {
         self.features.is_empty()
     }
 
-    /// The features of a reading.
+    /// Returns the features of a reading.
     pub fn apply(&self, reading: &[f64]) -> Vec<f64> {
         let norm = self.norm(reading).max(self.least_norm);
         let standardized =
@@ -148,10 +141,10 @@ impl Features {
         self.features.iter().map(standardized).collect()
     }
 
-    /// Checks numbers that come from a file, for readings of `channels` channels.
+    /// Checks values from a file.
     ///
     /// # Errors
-    /// [`LocatorFault`], which names the inconsistent numbers.
+    /// [`LocatorFault`].
     pub fn check(&self, channels: usize) -> Result<(), LocatorFault> {
         let positive = |what, numbers: &mut dyn Iterator<Item = f64>| {
             LocatorFault::check_numbers(what, numbers, |value| value > 0.0, "finite and greater than 0")
@@ -171,7 +164,6 @@ impl Features {
         LocatorFault::check_count("features of known sources", self.features.len().max(1), made)
     }
 
-    /// ‖r‖ of the scaled channels.
     pub(crate) fn norm(&self, reading: &[f64]) -> f64 {
         let square = |scale: &ChannelScale| (value(reading, scale.channel) / scale.divisor).powi(2);
         self.channels.iter().map(square).sum::<f64>().sqrt()
@@ -188,7 +180,6 @@ impl Features {
         }
     }
 
-    /// The feature of `source`; `None` for a constant one.
     fn standardized(&self, source: FeatureSource, recording: &Recording) -> Option<Feature> {
         let raw = |reading: &[f64]| self.raw(source, reading, self.norm(reading).max(self.least_norm));
         let values: Vec<f64> = recording.rows.iter().map(|row| raw(&row.reading)).collect();
@@ -199,7 +190,6 @@ impl Features {
     }
 }
 
-/// The channels that vary, over the root mean square of those of their kind.
 fn channel_scales(recording: &Recording) -> Vec<ChannelScale> {
     let column = |channel: usize| recording.rows.iter().map(move |row| value(&row.reading, channel));
     let varies = |channel: &usize| {
@@ -219,7 +209,6 @@ fn channel_scales(recording: &Recording) -> Vec<ChannelScale> {
     live.iter().map(of_one).filter(|scale| scale.divisor.is_finite() && scale.divisor > 0.0).collect()
 }
 
-/// A channel's value; 0 for a missing one.
 fn value(reading: &[f64], channel: usize) -> f64 {
     reading.get(channel).copied().unwrap_or(0.0)
 }

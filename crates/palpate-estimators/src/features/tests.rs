@@ -11,7 +11,7 @@ use crate::simulate::simulate_at;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
 
-/// Readings of forces between 1 and 3 at ten places: two lever reactions, a dead channel and a deflection.
+/// Readings of forces from 1 to 3 at ten positions: two lever reactions, a disabled channel and a deflection.
 fn recording() -> Recording {
     let rows = (0..30).map(|i| row(f64::from(i % 10) / 9.0, 1.0 + f64::from(i / 10)));
     recording_of(rows.collect())
@@ -102,7 +102,7 @@ fn a_damaged_file_is_refused() {
     }
 }
 
-/// Readings beside the supports of a beam are almost 0 at both ends; only their proportions distinguish the ends.
+/// Near both supports of a beam readings are almost 0; only proportions distinguish the ends.
 #[test]
 fn the_ends_of_a_beam_are_told_apart_where_the_force_is_known() {
     let Example { setup, training } = paper(5e-6, 5);

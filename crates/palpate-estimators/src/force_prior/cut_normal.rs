@@ -1,9 +1,9 @@
-//! Normal prior of a force, cut off at 0 and at a greatest force, and normal posteriors that are cut off there.
+//! Truncated normal prior of a force.
 
 use super::{ForceIntegral, ForceLikelihood, PriorTerms};
 use palpate_numerics::normal_between;
 
-/// Normal distribution of a force, cut off at 0 and at a greatest force.
+/// Normal distribution, truncated at 0 and a maximum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct NormalPrior {
     pub mean_n: f64,
@@ -11,7 +11,6 @@ pub(crate) struct NormalPrior {
     pub greatest_n: f64,
 }
 
-/// Prior times likelihood: a normal distribution that is cut off at 0 and at a greatest force.
 #[derive(Clone, Copy)]
 pub(super) struct CutNormal {
     pub mean_n: f64,
@@ -48,7 +47,7 @@ impl NormalPrior {
 }
 
 impl CutNormal {
-    /// The integral, by −2·ln of the density at the mean.
+    /// From −2·ln of the density at the mean.
     pub fn integrate(self, peak_cost: f64) -> ForceIntegral {
         let Self { mean_n, precision, greatest_n } = self;
         if precision.is_nan() || precision <= 0.0 {

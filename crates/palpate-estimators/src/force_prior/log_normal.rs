@@ -1,36 +1,35 @@
-//! Log-normal prior of a force, cut off at a greatest force, and its integral with the likelihood of a reading.
+//! Truncated log-normal prior of a force, and its integral with a likelihood.
 //!
-//! A likelihood exp(b·W − ½·a·W²) has the least-squares force Ŵ = b/a and the signal-to-noise ratio z = Ŵ·√a. The integral is computed
+//! A likelihood exp(b·W − ½·a·W²) has the maximum Ŵ = b/a and the signal-to-noise ratio z = Ŵ·√a. The
+//! integral uses
 //!
-//! - for z·min(1, s) ≥ 6 by the prior's logarithm expanded about Ŵ to the second order, which leaves a normal distribution, cut off at both ends.
-//!   With a relative standard deviation of 1/6 or less, the third order is a hundredth of the integral or less;
-//! - otherwise by the trapezoidal rule over t = ln W. For a density of standard deviation σ in t the rule with the step h errs by 2·e^(−2π²σ²/h²).
-//!   The likelihood has σ = 1/z ≥ min(1, s)/6 and the prior σ = s, so h = min(1, s)/8 errs by less than a thousandth, also where the cut is near.
+//! - for z·min(1, s) ≥ 6 the log prior about Ŵ to second order: the third is at most a hundredth at a
+//!   relative standard deviation of 1/6;
+//! - otherwise the trapezoidal rule over t = ln W, with error 2·e^(−2π²σ²/h²). For σ ≥ min(1, s)/6 the step h
+//!   = min(1, s)/8 errs by less than a thousandth.
 
 use super::cut_normal::CutNormal;
 use super::{ForceIntegral, ForceLikelihood, PriorTerms};
 use palpate_numerics::NORMAL_99;
 
-/// Log-normal distribution that is cut off at a greatest force.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LogNormalPrior {
     /// μ and s.
     log_median: f64,
     log_sd: f64,
     greatest_n: f64,
-    /// W and its probability at the nodes of the trapezoidal rule, in rising order.
+    /// W and probability, rising.
     nodes: Vec<[f64; 2]>,
 }
 
-/// Least z·min(1, s) of a prior that hardly changes over the likelihood.
+/// Least z·min(1, s) of the expansion.
 const DISTINCT: f64 = 6.0;
-/// Standard deviations below the median at which the nodes begin: less than 1 in 30,000 is lighter.
+/// Lowest node in standard deviations: a tail below 1 in 30,000.
 const LOWEST: f64 = 4.0;
 
 impl LogNormalPrior {
-    /// The log-normal distribution with these quantiles at 0.5 % and 99.5 %, cut off at the upper one.
     pub fn new(least_n: f64, greatest_n: f64) -> Self {
-        /// The most nodes, which a range of 60 decades needs. A rule with longer steps is coarse, and still a prior.
+        /// For 60 decades; longer steps are coarse but valid.
         const MOST_NODES: f64 = 2000.0;
         // A power of a force may overflow or underflow.
         let in_numbers = |force_n: f64| force_n.clamp(f64::MIN_POSITIVE, f64::MAX).ln();
@@ -50,12 +49,11 @@ impl LogNormalPrior {
         Self { log_median, log_sd, greatest_n, nodes }
     }
 
-    /// The least force that matters, and the greatest that is possible, in newtons.
     pub fn ends_n(&self) -> (f64, f64) {
         (self.nodes[0][0], self.greatest_n)
     }
 
-    /// The cost, −2·ln, of the width of a likelihood of signal-to-noise ratio z beside the prior's, by z².
+    /// −2·ln of the width relative to the prior, from z².
     pub fn signal_cost(&self, square: f64) -> f64 {
         (self.log_sd * self.log_sd * square.max(0.0)).ln_1p()
     }
@@ -66,7 +64,7 @@ impl LogNormalPrior {
         PriorTerms { cost: residual * residual, slope: residual * slope, precision: slope * slope }
     }
 
-    /// Mode of the posterior where the prior hardly changes over the likelihood, the mean elsewhere.
+    /// Mode where the expansion is valid, else mean.
     pub fn estimate_n(&self, b: f64, a: f64) -> f64 {
         if self.is_distinct(b, a) {
             self.expand(b, a).0.mean_n.clamp(0.0, self.greatest_n)
@@ -89,26 +87,24 @@ impl LogNormalPrior {
         b > 0.0 && a > 0.0 && b * self.log_sd.min(1.0) >= DISTINCT * a.sqrt()
     }
 
-    /// ln W from the median, in standard deviations.
     fn deviation(&self, force_n: f64) -> f64 {
         (force_n.ln() - self.log_median) / self.log_sd
     }
 
-    /// The posterior by the second order of ln p about Ŵ, and −2·ln of p at its mean: p = exp(−q²/2)/(s·W) with q = (ln W − μ)/s; with k = q/s the
-    /// slope is −(1 + k)/W and the curvature (1 + k − 1/s²)/W².
+    /// Expansion: ln p, p = exp(−q²/2)/(s·W), q = (ln W − μ)/s, k = q/s has the slope −(1 + k)/W and the
+    /// curvature (1 + k − 1/s²)/W².
     fn expand(&self, b: f64, a: f64) -> (CutNormal, f64) {
         let found_n = b / a;
         let q = self.deviation(found_n);
         let k = q / self.log_sd;
         let slope = -(1.0 + k) / found_n;
         let curvature = (1.0 + k - self.log_sd.powi(-2)) / (found_n * found_n);
-        // Far below the range, the prior alone has no maximum by its curvature; the curvature of the likelihood remains.
+        // Far below the range the prior has no maximum; the curvature of the likelihood remains.
         let precision = (a - curvature).max(0.5 * a);
         let cut = CutNormal { mean_n: found_n + slope / precision, precision, greatest_n: self.greatest_n };
         (cut, q * q + 2.0 * (self.log_sd * found_n).ln() - slope * slope / precision)
     }
 
-    /// By the trapezoidal rule.
     fn sum(&self, likelihood: ForceLikelihood) -> ForceIntegral {
         let ForceLikelihood { b, a, .. } = likelihood;
         let exponent = |force_n: f64| force_n * (b - 0.5 * a * force_n);
@@ -143,7 +139,6 @@ impl LogNormalPrior {
 }
 
 impl ForceLikelihood {
-    /// M of a force.
     fn misfit_at(&self, force_n: f64) -> f64 {
         self.misfit + (force_n - self.at_n) * (self.a * (force_n + self.at_n) - 2.0 * self.b)
     }

@@ -5,17 +5,14 @@ fn log_normal(least_n: f64, greatest_n: f64) -> ForcePrior {
     ForcePrior::LogNormal(LogNormalPrior::new(least_n, greatest_n))
 }
 
-/// The likelihood exp(b·W − ½·a·W²).
 fn likelihood(b: f64, a: f64) -> ForceLikelihood {
     ForceLikelihood { b, a, at_n: 0.0, misfit: 0.0 }
 }
 
-/// −2·ln of the integral.
 fn cost(integral: ForceIntegral) -> f64 {
     integral.peak_cost + integral.width_cost
 }
 
-/// Integral, mean and variance by small steps of ln W.
 fn by_small_steps(range: (f64, f64), b: f64, a: f64) -> [f64; 3] {
     const STEPS: usize = 400_000;
     let (low, high) = (range.0.ln(), range.1.ln());
@@ -48,7 +45,7 @@ fn integrals_are_those_of_small_steps() {
             let force_n = if share < 0.0 { -low } else { low * (high / low).powf(share) };
             for z in [0.1, 1.0, 3.0, 5.5, 7.0, 20.0, 100.0] {
                 if share < 0.0 && z > 1.0 {
-                    // Excluded at the lower end: the posterior is in a tail without nodes.
+                    // At the lower end the posterior is in a tail without nodes.
                     continue;
                 }
                 let a = (z / force_n).powi(2);

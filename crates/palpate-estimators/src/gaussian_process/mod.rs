@@ -1,8 +1,6 @@
-//! Gaussian-process regression of the contact's position on the features of a reading.
+//! Gaussian-process regression of the contact position.
 //!
-//! The inverse method: position = f(features) + error. f is a Gaussian process; the error has a fitted variance, and
-//! stands for the effect of the sensors' noise on the position. The method requires only a smooth surface. One error for the whole
-//! surface is too small where the sensors are insensitive, and too large elsewhere: [`Widths`] correct the intervals by errors at held-out positions.
+//! Position = f(features) + error, with one error variance. [`Widths`] correct the intervals locally.
 
 mod selection;
 mod widths;
@@ -23,7 +21,7 @@ use palpate_numerics::normal_interval_95;
 use palpate_numerics::regression::{GaussianProcess, Kernel, Regression, RegressionError, Trend};
 use palpate_numerics::watch::Cancelled;
 
-/// Gaussian-process regression of the contact's position.
+/// Gaussian-process regression of the contact position.
 ///
 /// ```
 /// use palpate_estimators::{arrangement::Training, fit::Fit, setup::Setup, gaussian_process::GaussianProcessEstimator};
@@ -38,13 +36,13 @@ use palpate_numerics::watch::Cancelled;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GaussianProcessEstimator {
-    /// Features of a reading; `None` for those of [`FeatureKind::contenders`] that evidence and held-out positions favour.
+    /// Features; `None` to choose among [`FeatureKind::contenders`].
     pub features: Option<FeatureKind>,
-    /// Kernel: the smoothness of the position as a function of the features.
+    /// Kernel over the features.
     pub kernel: Kernel,
-    /// Trend: the position for readings unlike any recorded.
+    /// Trend far from the recording.
     pub trend: Trend,
-    /// The hyperparameters are optimised on at most this many rows, drawn at random; at least 2.
+    /// Limit of rows for the hyperparameter search; at least 2.
     pub search_points: usize,
 }
 
@@ -54,27 +52,26 @@ impl Default for GaussianProcessEstimator {
     }
 }
 
-/// A recording that a Gaussian process cannot be fitted to.
+/// Recording that a Gaussian process does not suit.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum GaussianProcessError {
-    /// Too few positions to interpolate between.
+    /// Too few positions.
     #[error(transparent)]
     Positions(#[from] TooFewPositions),
-    /// No channel varies.
+    /// Constant channels.
     #[error(transparent)]
     Features(#[from] NoFeatures),
-    /// A regression that failed.
+    /// Failed regression.
     #[error(transparent)]
     Regression(#[from] RegressionError),
-    /// The recording's channels are not the setup's.
+    /// Channel mismatch.
     #[error(transparent)]
     Channels(#[from] ChannelMismatch),
-    /// The fit was stopped.
+    /// Cancelled.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
 
-/// Least number of distinct positions, below which the position cannot be a function of the reading.
 const LEAST_POSITIONS: usize = 2;
 
 impl Fit for GaussianProcessEstimator {
@@ -103,7 +100,7 @@ impl Fit for GaussianProcessEstimator {
 }
 
 impl GaussianProcessEstimator {
-    /// For each kind of features, hyperparameters from all rows, and from one row of each position where there are repeats.
+    /// Candidates from all rows, and from one row per repeated position.
     fn candidates(
         &self,
         task: FitTask,
@@ -113,7 +110,7 @@ impl GaussianProcessEstimator {
         let extent = setup.surface().extent();
         let kinds =
             self.features.map_or_else(|| FeatureKind::contenders(setup, recording), |kind| vec![kind]);
-        // With more positions than searched rows, few of the searched rows are repeats.
+        // With more positions than search rows, few of the search rows are repeats.
         let without_repeats =
             recording.one_row_a_position(seed).filter(|few| few.rows.len() < self.search_points);
         let mut candidates = Vec::with_capacity(2 * kinds.len());
@@ -133,27 +130,25 @@ impl GaussianProcessEstimator {
     }
 }
 
-/// A Gaussian process that locates.
+/// Fitted Gaussian process.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GaussianProcessLocator {
-    /// Features of a reading.
+    /// Features.
     pub features: Features,
-    /// The posterior of x, and of y where the surface has a width, in metres.
+    /// Posterior of x, and y on a plane.
     pub process: GaussianProcess,
-    /// The surface.
+    /// Surface.
     pub extent: Extent,
-    /// The contact's force in newtons, where it is known.
+    /// Known force.
     pub force_n: Option<f64>,
-    /// Widths of the intervals, where enough positions could be held out.
+    /// Interval widths, with enough held-out positions.
     pub widths: Option<Widths>,
 }
 
 impl Locate for GaussianProcessLocator {
     type Check = NoCheck;
 
-    /// The posterior mean, with the variance of the contact's position: that of the function and the fitted error of a single row, times the square
-    /// of the factor from held-out positions.
     fn locate(&self, reading: &[f64]) -> Estimate {
         let features = self.features.apply(reading);
         let (means_m, variances_m2) = self.process.predict(&features);

@@ -1,8 +1,7 @@
-//! The choice of features and hyperparameters: by evidence, and by errors at held-out positions.
+//! Choice of features and hyperparameters by log evidence and held-out errors.
 //!
-//! The evidence treats the repeats of a position as independent observations of it. With few positions and many repeats it prefers functions that are
-//! flat around each position and steep between them, far off where the surface was not pressed. Errors at held-out positions show that; but they are
-//! few, and differ by chance. So the evidence decides, unless those errors disagree by a margin.
+//! The evidence treats repeats as independent, and thus prefers functions that are flat about few positions.
+//! Held-out errors reveal this but scatter, so only a margin overrides the evidence.
 
 use ndarray::Array2;
 
@@ -16,15 +15,12 @@ use palpate_numerics::mean;
 use palpate_numerics::regression::{GaussianProcess, Hyperparameters, Regression, Samples};
 use palpate_numerics::watch::Watch;
 
-/// Features and hyperparameters to choose from.
 pub(super) struct Candidate {
     pub features: Features,
     pub hyperparameters: Hyperparameters,
-    /// The posterior of all rows, where all were searched.
     pub process: Option<GaussianProcess>,
 }
 
-/// Features of rows, and the positions of their presses.
 pub(super) struct Points {
     coordinates: Array2<f64>,
     outputs_m: Array2<f64>,
@@ -49,7 +45,6 @@ impl Points {
     }
 }
 
-/// The choice among candidates.
 pub(super) struct Selection<'a> {
     pub recording: &'a Recording,
     pub regression: Regression,
@@ -58,9 +53,8 @@ pub(super) struct Selection<'a> {
 }
 
 impl Selection<'_> {
-    /// The candidate of the greatest evidence, unless another has an error at held-out positions that is less by [`MARGIN`].
+    /// Greatest log evidence, unless another held-out error is less by [`MARGIN`].
     pub fn best(&self, mut candidates: Vec<Candidate>) -> Result<Candidate, GaussianProcessError> {
-        /// Most rows for held-out errors; more would cost time and change little.
         const MOST: usize = 500;
         const MARGIN: f64 = 1.25;
         const FOLDS: usize = 5;
@@ -85,7 +79,6 @@ impl Selection<'_> {
         Ok(candidates.swap_remove(best.1))
     }
 
-    /// Mean error at the positions that folds hold out; infinite where folds hold out no position.
     fn held_out_error_m(
         &self,
         Candidate { features, hyperparameters, .. }: &Candidate,
@@ -108,8 +101,7 @@ impl Selection<'_> {
     }
 }
 
-/// Folds by position: `most`, or one a position where there are fewer positions. A position beyond all remaining ones of a fold is not held out, as few contacts lie
-/// beyond all presses.
+/// A position beyond all others of its fold stays in, as contacts rarely lie there.
 pub(super) fn folds_between(recording: &Recording, most: usize) -> Vec<Fold> {
     let mut folds = recording.folds(recording.distinct_positions().len().min(most)).unwrap_or_default();
     for Fold { training, held_out } in &mut folds {

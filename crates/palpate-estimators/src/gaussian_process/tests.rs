@@ -1,5 +1,3 @@
-//! The method on simulated benches, and on public recordings by the protocols that come with them.
-
 use std::sync::LazyLock;
 
 use palpate_core::Status;
@@ -27,7 +25,6 @@ fn fit(setup: &Setup, recording: &Recording) -> Result<GaussianProcessLocator, G
     GaussianProcessEstimator::default().fit_method(task)
 }
 
-/// Four bell-shaped sensors along 400 mm, and noise.
 fn bells(x_m: f64, force_n: f64, noise: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
     let mut channel = |i: usize| {
         let error: f64 = StandardNormal.sample(rng);
@@ -38,8 +35,7 @@ fn bells(x_m: f64, force_n: f64, noise: f64, rng: &mut Xoshiro256PlusPlus) -> Ro
     Row { position: Position::along(x_m), force_n: None, nuisances: Vec::new(), time_s: None, reading }
 }
 
-/// Repeats are not independent observations of the position. Treated as such they led to functions that are flat around every position, and 40 mm off
-/// between them.
+/// Repeats are not independent observations; as such they would make functions flat about every position.
 #[test]
 fn repeats_make_it_better() {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0)).unwrap();
@@ -99,7 +95,7 @@ fn a_pad_is_two_dimensional() {
     let setup = raw_setup(extent, 5, None);
     let locator = fit(&setup, &raw_recording(rows.collect())).unwrap();
     assert_eq!(locator.check(&setup), Ok(()));
-    // Between the grid's points, with half of the size, and another reading of the dead channel.
+    // Between the grid points, with half of the size, and another reading of the disabled channel.
     let estimate = locator.locate(&[0.375, 0.125, 0.375, 0.125, 0.0].map(|r: f64| 0.5 * r));
     assert!((estimate.contact.position.x_m - 0.05).abs() < 1e-3, "{estimate:?}");
     assert!((estimate.contact.position.y_m - 0.05).abs() < 1e-3, "{estimate:?}");
@@ -110,7 +106,7 @@ fn a_pad_is_two_dimensional() {
 
 #[test]
 fn a_position_beyond_the_edge_is_said_to_be_one() {
-    // Presses as far as the edge, and the reading of a press beyond it.
+    // Presses up to the edge, and the reading of a press beyond it.
     let rows = (0..41).map(|i| {
         let x_m = 0.01 * f64::from(i);
         Row {
@@ -161,7 +157,6 @@ fn it_comes_back_from_a_file_and_a_damaged_file_is_refused() {
     assert!(damaged.check(&bench_4).is_err());
 }
 
-/// Errors over five folds by position.
 fn five_folds(name: &str, setup: &Setup, recording: &Recording) -> (ErrorSummary, f64) {
     let task = FitTask::new(setup, recording).seed(1);
     let held_out = cross_validate(&GaussianProcessEstimator::default(), task, 5).unwrap();
@@ -173,10 +168,11 @@ fn five_folds(name: &str, setup: &Setup, recording: &Recording) -> (ErrorSummary
     (errors, coverage)
 }
 
-/// Its hyperparameters come from other starts and a prior, so scikit-learn's figures are met within a hundredth.
+/// Hyperparameters come from other starts and a prior than scikit-learn's, so its figures are matched within
+/// a hundredth.
 const SLACK: f64 = 1.01;
 
-/// Fails when median and mean are beyond scikit-learn's, or the intervals do not have their coverage.
+/// Fails where median and mean exceed scikit-learn's, or the coverage is wrong.
 fn check(name: &str, (setup, recording): (Setup, Recording), median_mm: f64, mean_mm: f64) {
     let (errors, coverage) = five_folds(name, &setup, &recording);
     let as_good = errors.median_m <= SLACK * mm(median_mm) && errors.average_m <= SLACK * mm(mean_mm);
@@ -211,14 +207,14 @@ fn a_magnetic_pad_is_as_scikit_learn_has_it() {
     check("pad", recording, 0.312, 0.343);
 }
 
-/// A twentieth better than scikit-learn's (6.36, 6.88 mm), as it may take logarithms for features.
+/// 5 % better than scikit-learn (6.36, 6.88 mm), with logarithms as features.
 #[test]
 fn a_sheet_is_better_than_scikit_learn_has_it() {
     let Some(recording) = sheet_recording() else { return };
     check("sheet", recording, 0.95 / SLACK * 6.36, 0.95 / SLACK * 6.88);
 }
 
-/// Noise that is five times as much on one half of a line.
+/// Noise that is five times greater on one half of a line.
 #[test]
 fn widths_follow_the_reading() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);

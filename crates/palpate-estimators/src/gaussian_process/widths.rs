@@ -1,10 +1,9 @@
-//! Widths of the 95 % intervals, by errors at held-out positions.
+//! Widths of 95 % intervals from held-out errors.
 //!
-//! A process has one error for the whole surface. Where sensors are insensitive the true error is larger; elsewhere the intervals are too wide, and
-//! all are too wide where errors have long tails. So positions are held out. There z_j = (estimate − truth)/σ_j along coordinate j, where σ_j is the
-//! standard deviation from the process. A second process models ln z_j² as a smooth function of the features, with the smoothness from its evidence;
-//! w_j = exp(½·E ln z_j²) is the factor by which σ_j is off near a reading (Goldberg, Williams and Bishop, Adv. Neural Inf. Process. Syst. 10, 1998).
-//! Number ⌈0.95·(n + 1)⌉ of the n values |z_j|/w_j in rising order, times w_j·σ_j, is the half-width (Papadopoulos, Gammerman and Vovk 2008).
+//! For z_j = (estimate − truth)/σ_j along coordinate j, a second process models ln z_j² over the features,
+//! and w_j = exp(½·E ln z_j²) (Goldberg, Williams and Bishop, Adv. Neural Inf. Process. Syst. 10, 1998). The
+//! half-width is w_j·σ_j times number ⌈0.95·(n + 1)⌉ of n sorted |z_j|/w_j (Papadopoulos, Gammerman and Vovk
+//! 2008).
 
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
@@ -23,19 +22,18 @@ use palpate_numerics::regression::{
 use palpate_numerics::watch::Watch;
 use palpate_numerics::{ELLIPSE_95, FEWEST_FOR_95, NORMAL_95, conformal_95};
 
-/// Factors on the standard deviations of a process, which give its intervals their coverage.
+/// Factors on standard deviations, for 95 % coverage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Widths {
     /// ln z_j² as functions of the features.
     pub logarithms: GaussianProcess,
-    /// Quantile of |z_j|/w_j over that of a normal variable, for each coordinate.
+    /// Conformal over normal quantile of |z_j|/w_j, by coordinate.
     pub factors: Vec<f64>,
-    /// On a plane, quantile of the quadratic form of all coordinates, so scaled, over that of normal variables.
+    /// Conformal over normal quantile of the quadratic form.
     pub ellipse: f64,
 }
 
-/// Errors over standard deviations, with the features of their readings.
 #[derive(Default)]
 struct HeldOut {
     features: Vec<Vec<f64>>,
@@ -43,11 +41,11 @@ struct HeldOut {
     positions: Vec<Position>,
 }
 
-/// Lower bound of |z| in its logarithm: that of a smaller one varies by chance alone.
+/// Lower bound of |z|: smaller values vary by chance.
 const LEAST_Z: f64 = 0.1;
 
 impl Widths {
-    /// Widths by positions that a process with these features and hyperparameters is not conditioned on; `None` with fewer than [`FEWEST_FOR_95`].
+    /// `None` for fewer than [`FEWEST_FOR_95`] positions.
     pub(super) fn held_out(
         task: FitTask,
         regression: Regression,
@@ -69,13 +67,11 @@ impl Widths {
         held_out.widths(searched, watch)
     }
 
-    /// Multiples of the standard deviation of each coordinate, about a reading with these features.
     pub(super) fn multiples(&self, features: &[f64]) -> Vec<f64> {
         let widths = local_widths(&self.logarithms, features);
         widths.into_iter().zip(&self.factors).map(|(width, factor)| factor * width).collect()
     }
 
-    /// Checks numbers that come from a file.
     pub(super) fn check(&self, features: usize, outputs: usize) -> Result<(), LocatorFault> {
         let logarithms = &self.logarithms;
         LocatorFault::check_count(
@@ -90,7 +86,6 @@ impl Widths {
     }
 }
 
-/// w_j about a reading with these features.
 fn local_widths(logarithms: &GaussianProcess, features: &[f64]) -> Vec<f64> {
     let mut widths = vec![0.0; logarithms.outputs()];
     logarithms.mean_into(features, &mut widths, &mut logarithms.scratch());
@@ -98,10 +93,9 @@ fn local_widths(logarithms: &GaussianProcess, features: &[f64]) -> Vec<f64> {
     widths
 }
 
-/// Folds that positions are dealt to.
 const FOLDS: usize = 10;
 
-/// Folds that are held out in turn: all where a process is fast, few where one has hundreds of presses.
+/// All for a fast process, few for hundreds of rows.
 pub(crate) fn folds_taken(rows: usize) -> usize {
     match rows {
         0..=1200 => FOLDS,
@@ -132,7 +126,7 @@ impl HeldOut {
         }
     }
 
-    /// Distinct positions. Errors of presses at one position are alike, so they count as one independent error.
+    /// Errors at one position are alike and count as one.
     fn places(&self) -> Vec<Position> {
         let mut places = self.positions.clone();
         places.sort_by(Position::cmp_by_x_then_y);
@@ -144,7 +138,6 @@ impl HeldOut {
         self.z.first().map_or(0, Vec::len)
     }
 
-    /// The process of ln z², by some of the errors; its hyperparameters are searched where they are unknown.
     fn logarithms(
         &self,
         chosen: &[usize],
@@ -172,7 +165,7 @@ impl HeldOut {
         let kept: Vec<usize> = thinned(self.z.len(), regression.search_points).collect();
         let logarithms = self.logarithms(&kept, regression, None, watch)?;
         let scaled = self.scaled(logarithms.hyperparameters(), &places, &kept, regression, watch)?;
-        // Without any error, as of simulated readings without noise, the factors are undetermined.
+        // Errors of 0, as of noise-free simulations, leave the factors undetermined.
         let bound = |sizes: Vec<f64>| conformal_95(sizes).filter(|size| size.is_finite() && *size > 0.0);
         let factor = |j: usize| Some(bound(scaled.iter().map(|z| z[j].abs()).collect())? / NORMAL_95);
         let factors: Option<Vec<f64>> = (0..self.outputs()).map(factor).collect();
@@ -185,7 +178,7 @@ impl HeldOut {
         Ok(Some(Widths { logarithms, factors, ellipse }))
     }
 
-    /// z over widths from errors at other positions, as those of contacts in use are.
+    /// From errors at other positions, as for contacts in use.
     fn scaled(
         &self,
         known: &Hyperparameters,

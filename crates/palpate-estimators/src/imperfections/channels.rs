@@ -1,4 +1,4 @@
-//! Channels in the course of time: saturation, hysteresis, creep, residue, drift of gain and offset.
+//! State of imperfect channels over time.
 
 use super::Imperfections;
 use rand::{RngExt, SeedableRng};
@@ -6,27 +6,26 @@ use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
-/// Channels of a bench, with their state.
+/// Imperfect channels of a bench, with their state.
 #[derive(Clone, Debug)]
 pub struct ImperfectChannels {
     imperfections: Imperfections,
-    /// Untouched reading of each channel, and its largest deviation from that.
+    /// Untouched reading and range of each channel.
     levels: Vec<(f64, f64)>,
     states: Vec<ChannelState>,
     time_s: f64,
-    /// Random stream of the walks, separate from those of noise and places.
     rng: Xoshiro256PlusPlus,
 }
 
-/// State of a simulated bench after a recording, from which a later one continues.
+/// Final state of a simulated recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BenchState {
-    /// Seed of gains, offsets and places of the bench.
+    /// Seed of gains, offsets and sensor positions.
     pub seed: u64,
-    /// Force for the ranges of its channels, in newtons.
+    /// Force that sets the channels' ranges.
     pub range_force_n: f64,
-    /// Time since its start, in seconds.
+    /// Time since the start.
     pub time_s: f64,
     /// State of each channel.
     pub channels: Vec<ChannelState>,
@@ -38,7 +37,7 @@ pub struct BenchState {
 pub struct ChannelState {
     /// Output of the play operator.
     pub play: f64,
-    /// Deviations that follow slowly.
+    /// Creep deviations.
     pub crept: [f64; 2],
     /// Residue of touches.
     pub residue: f64,
@@ -46,11 +45,11 @@ pub struct ChannelState {
     pub walk: f64,
 }
 
-/// Distinguishes the stream of the walks from those of noise, finger and lost frames, which have the same seed.
+/// Distinguishes random streams of one seed.
 const WALKS: u64 = 0xA6_E109;
 
 impl ImperfectChannels {
-    /// Channels with these untouched readings and ranges, at rest at time 0; their random walks are drawn by the seed.
+    /// Returns channels at rest at time 0.
     pub fn new(imperfections: Imperfections, untouched: &[f64], ranges: &[f64], seed: u64) -> Self {
         Self {
             imperfections,
@@ -61,7 +60,7 @@ impl ImperfectChannels {
         }
     }
 
-    /// The channels in the final state of an earlier recording, with fresh random walks from there on.
+    /// Continues from a state, with fresh random walks.
     #[must_use]
     pub fn resumed(mut self, state: &BenchState) -> Self {
         self.states.iter_mut().zip(&state.channels).for_each(|(own, left)| *own = *left);
@@ -70,12 +69,12 @@ impl ImperfectChannels {
         self
     }
 
-    /// The imperfections.
+    /// Imperfections.
     pub const fn imperfections(&self) -> &Imperfections {
         &self.imperfections
     }
 
-    /// Time since the start, in seconds.
+    /// Time since the start.
     pub const fn time_s(&self) -> f64 {
         self.time_s
     }
@@ -85,7 +84,7 @@ impl ImperfectChannels {
         &self.states
     }
 
-    /// Advances time by a step under constant contacts with the faultless reading `clean`; returns the reading at its end, without noise.
+    /// Advances time under constant contacts, and returns the reading with imperfections.
     pub fn advance(&mut self, clean: &[f64], step_s: f64) -> Vec<f64> {
         self.time_s += step_s;
         let Imperfections { drift, common_drift, .. } = self.imperfections;
@@ -111,14 +110,12 @@ impl ImperfectChannels {
         reading
     }
 
-    /// A step of a walk of standard deviation 1; 0, without a draw, where it is not needed.
     fn draw(&mut self, is_needed: bool) -> f64 {
         if is_needed { self.rng.sample(StandardNormal) } else { 0.0 }
     }
 }
 
 impl ChannelState {
-    /// Saturation, hysteresis, creep and residue of a deviation x of a channel of this range.
     fn deform(&mut self, x: f64, range: f64, imperfections: &Imperfections, step_s: f64) -> f64 {
         let saturated = saturate(x, range, imperfections.saturation);
         let half = 0.5 * imperfections.hysteresis * range;
@@ -126,7 +123,7 @@ impl ChannelState {
         self.creep(self.play, imperfections, step_s) + self.leave_residue(self.play, imperfections, step_s)
     }
 
-    /// The share c of each creep follows by z' = (x − z)/τ: (1 − Σc)·x + Σ c·z.
+    /// z' = (x − z)/τ for each share c: (1 − Σc)·x + Σ c·z.
     fn creep(&mut self, x: f64, imperfections: &Imperfections, step_s: f64) -> f64 {
         let mut crept = x;
         for (creep, z) in
@@ -138,7 +135,6 @@ impl ChannelState {
         crept
     }
 
-    /// A share of the largest deviation of a touch, which fades by its time constant.
     fn leave_residue(&mut self, x: f64, imperfections: &Imperfections, step_s: f64) -> f64 {
         let residue = imperfections.residue;
         if residue.share > 0.0 {
@@ -152,7 +148,7 @@ impl ChannelState {
     }
 }
 
-/// x/(1 + a·|x|/R) with a = s/(1 − s), which falls short of x by the share s at the range R.
+/// x/(1 + a·|x|/R), a = s/(1 − s).
 fn saturate(x: f64, range: f64, share: f64) -> f64 {
     if share > 0.0 && range > 0.0 { x / (1.0 + share / (1.0 - share) * x.abs() / range) } else { x }
 }

@@ -1,12 +1,9 @@
-//! Imperfections of real benches, which simulations of recordings and boards add to the model of the surface: soft layers, saturation,
-//! hysteresis, creep, residue, drift of offset and gain, noise that is correlated or has heavy tails, and loggers that repeat readings.
+//! Imperfections of benches in simulations.
 //!
-//! A reading passes through them in this order: a [soft layer](Imperfections::touch_width_m) spreads the contact; the deviation x of each
-//! channel from its untouched reading [saturates](Imperfections::saturation), passes a [play operator](Imperfections::hysteresis),
-//! [creeps](Imperfections::creep), leaves a [residue](Imperfections::residue), is multiplied by the drifting gain, and is shifted by the
-//! drifting offset; then come noise, steps and limits of the channel
-//! ([`ChannelModel`](palpate_mechanics::sensing::ChannelModel)). Displacements of sensors and presses are numbers of the channel model
-//! (`position_error_m`) and of the training (`placement_sd_m`).
+//! Order: [soft layer](Imperfections::touch_width_m); for deviations from the untouched reading
+//! [saturation](Imperfections::saturation), [play operator](Imperfections::hysteresis),
+//! [creep](Imperfections::creep), [residue](Imperfections::residue), gain drift and offset drift; then the
+//! [`ChannelModel`](palpate_mechanics::sensing::ChannelModel).
 
 mod channels;
 mod noise;
@@ -20,7 +17,8 @@ use palpate_mechanics::contact::Extent;
 use palpate_numerics::OutOfRange;
 use serde::{Deserialize, Serialize};
 
-/// Imperfections of a bench; none by default. Plain data: a [`Setup`](crate::setup::Setup::with_imperfections) refuses a number out of its range.
+/// Imperfections of a bench, checked by
+/// [`Setup::with_imperfections`](crate::setup::Setup::with_imperfections).
 ///
 /// ```
 /// use palpate_estimators::arrangement::Training;
@@ -43,37 +41,37 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Imperfections {
-    /// Width w of each channel's hysteresis as a share of its range, at least 0 and below 1: a play operator,
-    /// y ← min(max(y, x − w/2), x + w/2) (Visintin, *Differential Models of Hysteresis*, 1994, ch. III).
+    /// Hysteresis width w relative to the channel's range, in [0, 1). Play operator y ← min(max(y, x − w/2),
+    /// x + w/2) (Visintin, *Differential Models of Hysteresis*, 1994, ch. III).
     pub hysteresis: f64,
-    /// Shares of a deviation that follow the contact slowly, each with a time constant: a Prony series of a linear viscoelastic body
-    /// (Ferry, *Viscoelastic Properties of Polymers*, 3rd ed. 1980, ch. 3). Their sum is below 1.
+    /// Creep shares with time constants; sum below 1. Prony series (Ferry, *Viscoelastic Properties of
+    /// Polymers*, 3rd ed. 1980, ch. 3).
     pub creep: [Relaxation; 2],
-    /// Share of the largest deviation of a touch that remains after it, and the time constant in which it fades; below 1.
+    /// Remaining share of a touch's largest deviation, in [0, 1), and its time constant.
     pub residue: Relaxation,
-    /// Drift of the offset of each channel by itself; the line goes up and down in channels in turn.
+    /// Independent offset drift, with a line of alternating sign.
     pub drift: OffsetDrift,
-    /// Drift of the offset that all channels share, as of the temperature.
+    /// Common offset drift, as of temperature.
     pub common_drift: OffsetDrift,
-    /// Drift of the gain of each channel by itself in a second: a line, up and down in channels in turn.
+    /// Independent linear gain drift, of alternating sign.
     pub gain_drift_per_s: f64,
-    /// Drift of the gain that all channels share in a second: a line.
+    /// Common linear gain drift.
     pub common_gain_drift_per_s: f64,
-    /// Correlation ρ of the noise of any two channels, at least 0 and below 1: √ρ·z₀ + √(1 − ρ)·zᵢ.
+    /// Noise correlation ρ in [0, 1): √ρ·z₀ + √(1 − ρ)·zᵢ.
     pub noise_correlation: f64,
-    /// Degrees of freedom ν of Student's t distribution, greater than 2, that the noise of each channel by itself has, scaled to the
-    /// standard deviation of the channel (Lange, Little and Taylor, *J. Am. Stat. Assoc.* 84, 1989); `None` for normal noise.
+    /// Degrees of freedom ν > 2 of Student's t noise at the given standard deviation (Lange, Little and
+    /// Taylor, *J. Am. Stat. Assoc.* 84, 1989); `None` for normal noise.
     pub noise_freedom: Option<f64>,
-    /// Rows that repeat each reading after the first, as of a logger that is faster than its sensors.
+    /// Repeats of each reading, as of a fast logger.
     pub repeated_readings: u32,
-    /// Width over which a soft layer spreads a contact, in metres, at least 0 and less than the shortest side of the surface; see
-    /// docs/explanation/imperfections.md. About the diameter 2·√(d·R) of Hertz's contact (Johnson, *Contact Mechanics*, 1985, ch. 4) plus the thickness of
-    /// the layer.
+    /// Width of a soft layer's contact, from 0 to below the shortest side; see
+    /// docs/explanation/imperfections.md. About Hertz's 2·√(d·R) (Johnson, *Contact Mechanics*, 1985, ch. 4)
+    /// plus the layer thickness.
     pub touch_width_m: f64,
-    /// Share s by which a deviation as large as the channel's range R falls short of a linear one, at least 0 and below 1:
-    /// x/(1 + s/(1 − s)·|x|/R), the hyperbolic law of a Langmuir isotherm and of resistive foams.
+    /// Saturation s in [0, 1) over the range R: x/(1 + s/(1 − s)·|x|/R), the hyperbolic law of Langmuir
+    /// isotherms and resistive foams.
     pub saturation: f64,
-    /// Force, in newtons, that sets a channel's range: its largest deviation over the surface under this force. `None` for the force of the presses.
+    /// Force of the channels' ranges (largest deviations); `None` for that of the presses.
     pub range_force_n: Option<f64>,
     /// Times of presses and rests.
     pub schedule: Schedule,
@@ -83,47 +81,45 @@ pub struct Imperfections {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Relaxation {
-    /// The share, at least 0 and below 1.
+    /// Share in [0, 1).
     pub share: f64,
-    /// The time constant in seconds, greater than 0 where the share is.
+    /// Time constant, positive for a positive share.
     pub time_s: f64,
 }
 
-/// A size in the unit of a channel.
+/// Amount in the unit of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Amount {
     /// As a share of the channel's range.
     Share(f64),
-    /// In the SI unit of the channel, or raw.
+    /// SI or raw value.
     Value(f64),
 }
 
-/// Drift of an offset: a line and a random walk.
+/// Offset drift: a line and a random walk.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct OffsetDrift {
-    /// Slope of the line, in a second.
+    /// Slope of the line per second.
     pub line_per_s: Amount,
-    /// Standard deviation of the walk after a second; it grows with the root of the time.
+    /// Standard deviation of the walk after 1 s.
     pub walk_per_root_s: Amount,
 }
 
-/// Times of a simulated recording: presses with untouched rests before them, between them and after them.
-///
-/// The times of the default are a policy: those of a person who follows a guided calibration.
+/// Times of a simulated recording; by default those of a guided manual calibration, a policy.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Schedule {
-    /// Time for which the surface is untouched before each press, and after the last, in seconds; greater than 0.
+    /// Rest before and after presses; greater than 0.
     pub rest_s: f64,
-    /// Rows that are recorded at the end of each of these rests.
+    /// Rows at the end of each rest.
     pub untouched_rows: u32,
-    /// Time for which a press rests before it is read, in seconds; greater than 0.
+    /// Time from contact to the first row; greater than 0.
     pub settle_s: f64,
-    /// Rows a second, in hertz; greater than 0.
+    /// Rows per second; greater than 0.
     pub rate_hz: f64,
-    /// Time from the end of a calibration to the first contact in use, in seconds; at least 0.
+    /// Time from calibration to use; at least 0.
     pub pause_s: f64,
 }
 
@@ -140,7 +136,7 @@ impl Default for Amount {
 }
 
 impl Amount {
-    /// The size in the unit of a channel of this range.
+    /// Returns the amount for a channel's range.
     pub fn of_range(self, range: f64) -> f64 {
         match self {
             Self::Share(share) => share * range,
@@ -156,17 +152,17 @@ impl Amount {
 }
 
 impl Relaxation {
-    /// Share of the way to a constant value that is left after a step of time: exp(−t/τ).
+    /// exp(−t/τ).
     fn remainder(self, step_s: f64) -> f64 {
         (-step_s / self.time_s).exp()
     }
 }
 
 impl Imperfections {
-    /// Checks that every number is in its range on a surface of this extent.
+    /// Checks every range.
     ///
     /// # Errors
-    /// [`OutOfRange`], for the first that is not.
+    /// [`OutOfRange`].
     pub fn check(&self, extent: Extent) -> Result<(), OutOfRange> {
         let [first, second] = self.creep;
         let shares = [
@@ -218,7 +214,7 @@ impl Imperfections {
 }
 
 impl Schedule {
-    /// Seconds between two rows of one press or rest.
+    /// Seconds between rows.
     pub fn row_s(&self) -> f64 {
         1.0 / self.rate_hz
     }

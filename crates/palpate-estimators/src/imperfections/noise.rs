@@ -1,20 +1,17 @@
-//! Noise that is correlated over the channels, or has heavy tails.
+//! Correlated or heavy-tailed noise.
 
 use super::Imperfections;
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal, StudentT};
 
-/// Noise of one reading of variance 1, correlated over the channels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StandardNoise {
-    /// Root of the share of the variance that all channels have in common, and of the rest.
+    /// Roots of the common and independent variance.
     weights: (f64, f64),
-    /// Distribution of a channel's own part, and the factor that gives it a variance of 1; `None` for a normal one.
     heavy: Option<(StudentT<f64>, f64)>,
 }
 
 impl StandardNoise {
-    /// The noise of these imperfections; normal and independent where they have none.
     pub fn new(imperfections: Option<&Imperfections>) -> Self {
         let correlation = imperfections.map_or(0.0, |imperfections| imperfections.noise_correlation);
         // A t variable of ν degrees of freedom has the variance ν/(ν − 2).
@@ -25,7 +22,6 @@ impl StandardNoise {
         Self { weights: (correlation.sqrt(), (1.0 - correlation).sqrt()), heavy }
     }
 
-    /// Noise of a reading of so many channels.
     pub fn draw(&self, channels: usize, rng: &mut impl Rng) -> Vec<f64> {
         let (common, own) = self.weights;
         let shared: f64 = if common > 0.0 { rng.sample(StandardNormal) } else { 0.0 };

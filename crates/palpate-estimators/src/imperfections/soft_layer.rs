@@ -1,13 +1,12 @@
-//! A soft layer on a surface, which spreads a contact.
+//! Soft layer that spreads a contact.
 
 use palpate_mechanics::contact::{Contact, Extent, Position};
 use palpate_mechanics::surface::midpoints;
 
-/// Points along the width of a touch. By the midpoint rule the second moment of the pressure, the first on which readings depend, is 1/64 too small.
+/// By the midpoint rule the second moment is 1/64 too small.
 const POINTS: usize = 8;
 
-/// A contact under a layer as point contacts of equal force in the middles of equal parts: of a stretch of this width on a line, of a square of
-/// this side on a plane, cut off at the edges of the surface.
+/// Equal point contacts over the width, truncated at the edges.
 pub(crate) fn spread_contact(contact: Contact, width_m: f64, extent: Extent) -> Vec<Contact> {
     if width_m <= 0.0 {
         return vec![contact];

@@ -126,7 +126,7 @@ fn a_soft_layer_spreads_the_force_over_its_width_and_stays_on_the_surface() {
     let variance =
         middle.iter().map(|point| (point.position.x_m - mean).powi(2)).sum::<f64>() / middle.len() as f64;
     assert!((force - 4.0).abs() < 1e-12 && (mean - 0.05).abs() < 1e-12);
-    // w²/12 of an even pressure, less 1/64.
+    // w²/12 of a uniform pressure, less 1/64.
     assert!((variance / (1e-4 / 12.0) - 63.0 / 64.0).abs() < 1e-9, "{variance}");
     let plane = Extent::plane(0.1, 0.08).unwrap();
     let corner = spread_contact(contact(0.1, 0.0), 0.01, plane);

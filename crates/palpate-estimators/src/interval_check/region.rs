@@ -1,4 +1,4 @@
-//! 95 % regions of held-out estimates beside the truth.
+//! 95 % regions and true values.
 
 use super::{HeldOutEstimate, UNBOUNDED};
 use crate::estimate_record::ContactRecord;
@@ -7,14 +7,13 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::small::Ldl;
 use palpate_numerics::{ELLIPSE_95, NORMAL_95};
 
-/// 95 % region of an estimate, and the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Region {
     Interval(Interval),
     Ellipse {
         /// C, as xx, xy and yy.
         covariance: [f64; 3],
-        /// Along and across, e − t.
+        /// e − t.
         error: [f64; 2],
         intervals: [Interval; 2],
     },
@@ -29,7 +28,6 @@ pub(super) struct Interval {
 }
 
 impl Region {
-    /// Region of the position; `None` for an estimate without intervals.
     pub fn of_position(held_out: &HeldOutEstimate, extent: Extent) -> Option<Self> {
         let ContactEstimate { position, uncertainty, .. } = held_out.estimate.contact;
         let Uncertainty { covariance: [xx, xy, _, yy, ..], x_95_m, y_95_m, .. } = uncertainty?;
@@ -45,7 +43,6 @@ impl Region {
         })
     }
 
-    /// Region of the force; `None` where the force is not estimated or was not recorded.
     pub fn of_force(held_out: &HeldOutEstimate, extent: Extent) -> Option<Self> {
         let contact = &held_out.estimate.contact;
         let interval_n = ContactRecord::new(contact, extent).force_interval_95_n()?;
@@ -59,7 +56,7 @@ impl Region {
         }
     }
 
-    /// Distance of the estimate from the truth, over the square root of the dimensions.
+    /// Over the root of the dimensions.
     pub fn error(&self) -> f64 {
         match self {
             Self::Interval(interval) => interval.error().abs(),
@@ -67,7 +64,7 @@ impl Region {
         }
     }
 
-    /// The least factor by which the region contains the truth, at most [`UNBOUNDED`].
+    /// Least factor to contain the truth, at most [`UNBOUNDED`].
     pub fn ratio(&self, added_sd: f64) -> f64 {
         match self {
             Self::Interval(interval) => interval.ratio(added_sd),
@@ -81,7 +78,7 @@ impl Region {
         }
     }
 
-    /// Logarithm of the standard deviation, or of the product of those along the axes of the ellipse.
+    /// Log standard deviation, or log product.
     pub fn log_size(&self, added_sd: f64) -> f64 {
         match self {
             Self::Interval(interval) => 0.5 * interval.variance(added_sd).ln(),
@@ -91,7 +88,6 @@ impl Region {
         }
     }
 
-    /// Square of the error in units of the standard deviations.
     pub fn square(&self, added_sd: f64) -> f64 {
         match self {
             Self::Interval(interval) => interval.error().powi(2) / interval.variance(added_sd),
@@ -101,7 +97,6 @@ impl Region {
         }
     }
 
-    /// Factors of the covariance with the added standard deviation; `None` for an interval, and for an ellipse without an area.
     fn factors(&self, added_sd: f64) -> Option<Ldl<2>> {
         let Self::Ellipse { covariance: [xx, xy, yy], .. } = self else { return None };
         let added = added_sd * added_sd;
@@ -126,9 +121,8 @@ impl Interval {
         (self.half_width() / NORMAL_95).powi(2) + added_sd * added_sd
     }
 
-    /// The least factor by which the interval contains the truth. Within the interval it is the error over the distance from the estimate
-    /// to the end on the side of the truth. Beyond it, the distance from the nearer end counts in half-widths, so an interval that ends at
-    /// its own estimate is widened too.
+    /// Beyond the interval, the distance from the nearer end counts in half-widths, as a side may have length
+    /// 0.
     fn ratio(&self, added_sd: f64) -> f64 {
         let half = self.half_width().hypot(NORMAL_95 * added_sd);
         let more = half - self.half_width();
@@ -155,7 +149,7 @@ mod tests {
     fn an_interval_contains_the_truth_once_widened_by_its_ratio() {
         for ((low, high), estimate, truth) in [
             ((0.4, 0.6), 0.5, 0.8),
-            // Ends at its estimate, or does not contain it.
+            // Intervals that end at their estimate, or do not contain it.
             ((0.4, 0.5), 0.5, 0.52),
             ((0.4, 0.5), 0.7, 0.9),
             ((0.4, 0.5), 0.45, 0.1),

@@ -21,11 +21,10 @@ fn plane() -> Extent {
     Extent::plane(1.0, 1.0).unwrap()
 }
 
-/// Standard deviations of the estimates, in metres and newtons.
 const SD_M: f64 = 1e-3;
 const SD_N: f64 = 0.1;
 
-/// Presses of some places. Their errors are a multiple of the standard deviation of the estimates.
+/// Presses with errors of a multiple of the standard deviation.
 fn estimates(places: usize, presses: usize, multiple: f64, seed: u64) -> Vec<HeldOutEstimate> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut error = || -> f64 {
@@ -57,7 +56,8 @@ fn intervals_that_are_too_narrow_are_widened_by_what_they_lack() {
         let check = IntervalCheck::of_estimates(&estimates(200, 5, 2.0, 1), extent).unwrap();
         assert_eq!(check.places, 200);
         for coverage in [check.position, check.force.unwrap()] {
-            // A half-width of 1.96 in standard deviations of 2, or an ellipse of χ² 6/4, contains 67 % or 53 %.
+            // A half-width of 1.96 in standard deviations of 2, or an ellipse of χ² 6/4, contains 67 % or 53
+            // %.
             let expected = if extent == plane() && coverage == check.position { 52.7 } else { 67.3 };
             assert!((coverage.before_percent - expected).abs() < 5.0, "{coverage:?}");
             assert!((coverage.factor - 2.0).abs() < 0.25, "{coverage:?}");
@@ -120,7 +120,7 @@ fn untouched_estimates_and_known_forces_are_left_out() {
     held_out[8].estimate.status = Status::OutsideModel;
     let check = IntervalCheck::of_estimates(&held_out, line()).unwrap();
     assert_eq!((check.places, check.force), (29, None));
-    // By noise alone 3 in 1,000 are outside the model: 1 of 30 may be, and 5 of 30 are too many.
+    // Noise alone puts 3 in 1,000 outside the model: 1 of 30 is possible, 5 of 30 are too many.
     assert_eq!((check.presses, check.outside_model, check.outside_model_percent()), (30, 1, None));
     held_out[10..14].iter_mut().for_each(|one| one.estimate.status = Status::OutsideModel);
     let check = IntervalCheck::of_estimates(&held_out, line()).unwrap();
@@ -166,7 +166,7 @@ fn a_fit_of_few_places_has_no_check() {
     assert_eq!(fit(19).unwrap().places, 19);
 }
 
-/// Presses that lie beside their places, located with intervals of different widths that do not include this error.
+/// Presses beside their positions, with intervals that do not include this error.
 fn beside_their_places(places: usize, widest_m: f64, placement_sd_m: f64, seed: u64) -> Vec<HeldOutEstimate> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -201,7 +201,7 @@ fn errors_that_intervals_do_not_know_add_a_standard_deviation() {
     }
 }
 
-/// Wide intervals at held-out places do not represent narrow ones in use.
+/// Wide held-out intervals do not represent narrow intervals in use.
 #[test]
 fn intervals_that_are_narrower_in_use_than_at_held_out_places_contain_the_position() {
     let mut covered = 0;
@@ -224,6 +224,6 @@ fn intervals_that_know_their_errors_get_no_standard_deviation() {
         let held_out = beside_their_places(40, 4e-3, 0.0, *seed);
         IntervalCheck::of_estimates(&held_out, plane()).unwrap().position.added_sd > 0.0
     });
-    // A parameter that is not needed raises the log-likelihood by more than 1 in 8 % of cases (half of χ²₁ beyond 2).
+    // An unneeded parameter raises the log-likelihood by more than 1 in 8 % of cases (half of χ²₁ beyond 2).
     assert!(added.count() <= 8);
 }

@@ -1,10 +1,9 @@
-//! Wider intervals of estimates.
+//! Widening of intervals.
 
 use palpate_core::{ContactEstimate, Estimate, Mode, Uncertainty};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::NORMAL_95;
 
-/// A standard deviation that is added to an interval's own, and the factor of its half-width.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Widening {
     pub added_sd: f64,
@@ -14,7 +13,7 @@ pub(crate) struct Widening {
 impl Widening {
     pub const NONE: Self = Self { added_sd: 0.0, factor: 1.0 };
 
-    /// A wider interval, lengthened to both sides alike. It stays within 0 and `size` where the original interval does.
+    /// Lengthens both sides, within 0 and `size` where the original is.
     pub fn interval(self, (low, high): (f64, f64), size: f64) -> (f64, f64) {
         let half = 0.5 * (high - low).max(0.0);
         let more = self.factor * half.hypot(NORMAL_95 * self.added_sd) - half;
@@ -25,13 +24,11 @@ impl Widening {
         self.factor * self.factor * (variance + self.added_sd * self.added_sd)
     }
 
-    /// Increase of a variance.
     pub fn added_variance(self, variance: f64) -> f64 {
         self.variance(variance) - variance
     }
 }
 
-/// Widening of the intervals of estimates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct EstimateWidening {
     pub position: Widening,
@@ -39,8 +36,7 @@ pub(crate) struct EstimateWidening {
 }
 
 impl EstimateWidening {
-    /// The estimate with wider intervals of all its contacts. Intervals within the surface stay within it, and a force interval above 0
-    /// stays above 0.
+    /// Intervals within the surface, and positive forces, stay so.
     pub fn widened(&self, estimate: Estimate, extent: Extent) -> Estimate {
         if [self.position, self.force] == [Widening::NONE; 2] {
             return estimate;
@@ -91,7 +87,7 @@ mod tests {
     fn intervals_end_where_the_surface_does() {
         assert_eq!(by_factor(2.0).interval((0.0, 0.3), 1.0), (0.0, 0.3 + 0.15));
         assert_eq!(by_factor(4.0).interval((0.6, 0.95), 1.0).1, 1.0);
-        // One that went beyond an end is not made shorter.
+        // An interval beyond an end is not shortened.
         assert_eq!(by_factor(2.0).interval((-0.2, 0.2), 1.0), (-0.2, 0.4));
         assert_eq!(by_factor(UNBOUNDED).interval((0.3, 0.3), 1.0), (0.3, 0.3));
     }

@@ -1,5 +1,3 @@
-//! The smallest detectable force, measured by the locators' own rule of `no_contact`.
-
 use super::*;
 use crate::closed_form::ClosedForm;
 use crate::estimator::{Estimator, Locator, Method};
@@ -19,7 +17,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 const READINGS: usize = 1000;
 
-/// Share of the readings of a contact in which a locator detects it.
+/// Detection probability of a contact.
 fn found(bench: &Example, locator: &Locator, contact: Contact) -> f64 {
     let (surface, layout) = (bench.setup.surface().model().unwrap(), bench.setup.layout());
     let clean = CleanSensors::new(surface, layout).reading(contact);
@@ -32,8 +30,8 @@ fn found(bench: &Example, locator: &Locator, contact: Contact) -> f64 {
     (0..READINGS).filter(is_found).count() as f64 / READINGS as f64
 }
 
-/// Checks that forces a tenth below the smallest detectable force are detected with less than its probability, and forces a tenth above it
-/// with more.
+/// Checks that forces a tenth below are detected less often than the stated probability, and those a tenth
+/// above more often.
 fn check(name: &str, bench: &Example, locator: &Locator, touch: &LightestTouch, positions: &[Position]) {
     for position in positions {
         for (share, force_n) in LightestTouch::FOUND.into_iter().zip(touch.forces_at(*position)) {
@@ -113,7 +111,7 @@ fn on_a_surface_without_a_model_it_is_true_within_a_tenth() {
     let Method::Influence(InfluenceLocator::ForceLinear(linear)) = &locator.method else { panic!() };
     let positions = [0.1, 0.2].map(Position::along);
     check("force-linear", &bench, &locator, &linear.lightest_touch(), &positions);
-    // The Cramér–Rao bound of the locator is that of the mechanics, up to the error of the learnt influences.
+    // The Cramér–Rao bound of the locator equals that of the mechanics, up to the error of learnt influences.
     let extent = setup.surface().extent();
     let (learnt, known) = (linear.cramer_rao_bound(extent), bench.setup.cramer_rao_bound().unwrap());
     for position in positions {
@@ -161,7 +159,7 @@ fn a_surface_that_does_not_notice_has_no_lightest_touch() {
     let touch = new(Box::new(|_| vec![0.0; 3]));
     assert_eq!(touch.forces_at(Position::along(0.1)), [None, None]);
     assert_eq!(touch.summaries(&[Position::along(0.1)]), [None, None]);
-    // On a saturating surface, contacts are detected at forces below saturation.
+    // On a saturating surface contacts are detected below saturation.
     let saturating = |contact: Contact| vec![(4.0 * contact.force_n).min(8.0), 0.0, 0.0];
     let touch = new(Box::new(saturating));
     let [half_n, surely_n] = touch.forces_at(Position::along(0.1)).map(Option::unwrap);
@@ -170,7 +168,7 @@ fn a_surface_that_does_not_notice_has_no_lightest_touch() {
 
 #[test]
 fn one_channel_and_one_unknown_are_a_normal_variable() {
-    // Detected above 3 or below −3, the square roots of C = 9; the length bound of 25 never decides.
+    // Detected above 3 or below −3, the roots of C = 9; the length bound of 25 never decides.
     let detection = Detection { channels: 1, unknowns: 1, square: 25.0, taken: 9.0 };
     for signal in [0.0, 1.5, 3.0, 5.0] {
         let expected =

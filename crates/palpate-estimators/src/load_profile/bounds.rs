@@ -1,44 +1,36 @@
-//! Bounds of sums over a load of any shape: the values that a reading does not exclude.
+//! Bounds of sums over a load of any shape, without a prior.
 //!
-//! A load next to a support is hardly read. A profile's own covariance covers only the cells that its prior fills, and does not show how
-//! much may lie in the others. Here no prior decides. With A, x ≥ 0 and y as in [the module above](super), v is within the bounds of a sum
-//! c·x when some load with c·x = v leaves ‖A·x − y‖² within [`RATIO_95`] of the least that any leaves (the likelihood ratio, profiled over all
-//! loads: Rust and Burrus, *Mathematical Programming and the Numerical Solution of Linear Equations*, 1972; Kuusela and Stark, *Annals of Applied
-//! Statistics* 11, 2017).
+//! With A, x ≥ 0 and y as in [the module above](super), the 95 % bounds of c·x include v if some load with
+//! c·x = v has ‖A·x − y‖² within [`RATIO_95`] of the minimum (profile likelihood: Rust and Burrus,
+//! *Mathematical Programming and the Numerical Solution of Linear Equations*, 1972; Kuusela and Stark,
+//! *Annals of Applied Statistics* 11, 2017).
 //!
-//! The least misfit for a given sum is computed without a constraint. By the conditions of Karush, Kuhn and Tucker, x that minimises
-//! ‖A·x − y‖² + ρ²·(c·x − t)² over x ≥ 0 has also the least misfit for its own sum, and that sum rises with t.
+//! By the Karush–Kuhn–Tucker conditions, the minimum of ‖A·x − y‖² + ρ²·(c·x − t)² over x ≥ 0 has the least
+//! misfit for its own sum, which increases with t.
 
 use ndarray::{Array1, Array2};
 use palpate_numerics::{Cholesky, holding};
 
-/// Misfit above the least, up to which a load is not excluded. For an unknown without bounds it would be 3.84, the 95 % quantile of χ² of one.
-/// Loads cannot pull, which makes the least misfit larger; with 3.84 the interval contained the total of two pads in mid-span in 92 % of readings.
+/// Critical misfit increase. The unconstrained 3.84 (χ², 95 %) covers only 92 %, because x ≥ 0 increases the
+/// least misfit.
 const RATIO_95: f64 = 5.0;
-/// Most doublings of a search's step; beyond them the sum has no bound.
+/// Beyond these doublings of a step the sum is unbounded.
 const MOST_DOUBLINGS: usize = 40;
-/// Halvings of the interval that contains a bound, or fewer where a secant is quicker.
 const MOST_STEPS: usize = 40;
-/// Negligible misfit.
 const NEGLIGIBLE: f64 = 1e-3;
 
-/// Loads that a reading does not exclude.
 pub(super) struct Bounds {
-    /// AᵀA.
     gram: Array2<f64>,
-    /// Aᵀy.
     right: Array1<f64>,
-    /// |y|².
     square: f64,
-    /// The load of least misfit.
     best: Array1<f64>,
-    /// The largest misfit that is not excluded.
+    /// Greatest accepted misfit.
     most: f64,
-    /// ρ² for a sum of coefficient 1.
+    /// ρ² for coefficient 1.
     stiffness: f64,
 }
 
-/// A load that has the least misfit for its sum.
+/// Load of least misfit for its sum.
 #[derive(Clone)]
 struct Least {
     load: Array1<f64>,
@@ -47,7 +39,6 @@ struct Least {
 }
 
 impl Bounds {
-    /// The loads on some cells that a whitened reading does not exclude.
     pub fn new(influence: &Array2<f64>, y: &Array1<f64>) -> Self {
         let (gram, right) = (influence.t().dot(influence), influence.t().dot(y));
         let stiffness = gram.diag().sum() / gram.nrows().max(1) as f64;
@@ -57,12 +48,11 @@ impl Bounds {
         Self { gram, right, square, best, most, stiffness }
     }
 
-    /// The least misfit of all loads on these cells.
     pub fn least_misfit(&self) -> f64 {
         self.most - RATIO_95
     }
 
-    /// Bounds of c·x; the upper one is infinite where the reading gives none.
+    /// Bounds of c·x, possibly infinite.
     pub fn of_sum(&self, c: &Array1<f64>) -> (f64, f64) {
         let [low, high] = [-1.0, 1.0].map(|side| self.bound(c, side));
         let low = low.map_or(f64::NEG_INFINITY, |(sum, _)| sum);
@@ -72,10 +62,10 @@ impl Bounds {
         (low, high)
     }
 
-    /// Bounds of the mean Σ a·x/Σ x over some cells, where a is the coordinate of each.
+    /// Bounds of Σ a·x/Σ x over some cells.
     ///
-    /// A mean v has a load that is not excluded if the bounds of Σ (a − v)·x contain 0. The load at the upper bound of that sum has a mean above v,
-    /// and this mean is the next v (Dinkelbach, *On Nonlinear Fractional Programming*, Management Science 13, 1967).
+    /// A mean v is accepted if the bounds of Σ (a − v)·x contain 0; the load at the upper bound gives the
+    /// next v (Dinkelbach, *On Nonlinear Fractional Programming*, Management Science 13, 1967).
     pub fn of_mean(&self, cells: &[usize], coordinates: &[f64]) -> (f64, f64) {
         let ends = coordinates.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |ends, a| holding(ends, *a));
         let mean = |load: &Array1<f64>| {
@@ -106,8 +96,7 @@ impl Bounds {
         if size > 0.0 { (bound(-1.0, ends.0), bound(1.0, ends.1)) } else { ends }
     }
 
-    /// The sum at which the least misfit reaches the largest one, on one side of the best sum, and a load beside it that is not excluded; `None`
-    /// where no sum reaches it.
+    /// Sum with the greatest accepted misfit on one side, and an accepted load near it.
     fn bound(&self, c: &Array1<f64>, side: f64) -> Option<(f64, Array1<f64>)> {
         let best = c.dot(&self.best);
         let step = side * 0.01 * best.abs().max(1.0 / self.stiffness.sqrt());
@@ -119,7 +108,7 @@ impl Bounds {
             if least.misfit > self.most {
                 return Some(self.between(c, inside, (t, least)));
             }
-            // No load has a smaller sum than 0.
+            // No load has a sum below 0.
             if side < 0.0 && least.sum <= 0.0 && c.iter().all(|c| *c >= 0.0) {
                 return Some((0.0, least.load));
             }
@@ -129,7 +118,7 @@ impl Bounds {
         None
     }
 
-    /// The sum between two targets t at which the least misfit is the largest one, with the load of the inner target.
+    /// As `bound`, between two targets t.
     fn between(
         &self,
         c: &Array1<f64>,
@@ -151,7 +140,6 @@ impl Bounds {
         (inside.sum + share * (outside.sum - inside.sum), inside.load)
     }
 
-    /// The load of least misfit for its sum, drawn to `t`.
     fn least(&self, c: &Array1<f64>, t: f64) -> Least {
         let drawn = Some((c, self.stiffness, t));
         let x = LeastSquares { gram: &self.gram, right: &self.right, drawn }.non_negative();
@@ -166,31 +154,27 @@ fn misfit((gram, right, square): (&Array2<f64>, &Array1<f64>, f64), x: &Array1<f
     used.iter().map(row).sum::<f64>() - 2.0 * x.dot(right) + square
 }
 
-/// A gradient below this share of the largest is rounding.
+/// Relative gradient rounding.
 const ROUNDING: f64 = 1e-10;
 
-/// ‖A·x − y‖² + ρ²·(c·x − t)², the second term where x is drawn.
+/// ‖A·x − y‖² + ρ²·(c·x − t)², the second term optional.
 struct LeastSquares<'a> {
     gram: &'a Array2<f64>,
     right: &'a Array1<f64>,
-    /// c, ρ² and t.
     drawn: Option<(&'a Array1<f64>, f64, f64)>,
 }
 
 impl LeastSquares<'_> {
-    /// An entry of AᵀA + ρ²·c·cᵀ.
     fn gram(&self, i: usize, j: usize) -> f64 {
         self.gram[[i, j]] + self.drawn.map_or(0.0, |(c, stiffness, _)| stiffness * c[i] * c[j])
     }
 
-    /// An entry of Aᵀy + ρ²·t·c.
     fn right(&self, i: usize) -> f64 {
         self.right[i] + self.drawn.map_or(0.0, |(c, stiffness, t)| stiffness * t * c[i])
     }
 
-    /// The minimum over x ≥ 0 by active sets (Lawson and Hanson, *Solving Least Squares Problems*, 1974, chapter 23). Among many nearly equal columns
-    /// it uses at most as many as there are rows, so that a wide A costs little. (`smoothness::minimise` uses nearly all of them, as smooth loads do,
-    /// and needs a positive definite matrix, which AᵀA is not.)
+    /// Active-set minimum over x ≥ 0 (Lawson and Hanson, *Solving Least Squares Problems*, 1974, chapter 23),
+    /// cheap for a wide A. `smoothness::minimise` needs a positive definite matrix, unlike AᵀA.
     fn non_negative(&self) -> Array1<f64> {
         let columns = self.right.len();
         let lengths: Vec<f64> = (0..columns).map(|j| self.gram(j, j).sqrt()).collect();
@@ -198,7 +182,7 @@ impl LeastSquares<'_> {
         let least = ROUNDING * right.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
         let mut x = Array1::<f64>::zeros(columns);
         let mut used: Vec<usize> = Vec::new();
-        // Columns that are a sum of those used, to rounding.
+        // Columns that linearly depend on the active ones, to rounding.
         let mut spent: Vec<usize> = Vec::new();
         for _ in 0..3 * columns {
             let slope =
@@ -212,8 +196,8 @@ impl LeastSquares<'_> {
         x
     }
 
-    /// Brings x to the minimum over the columns in use, without those that would be negative. Returns false, with x unchanged, where the column
-    /// `next` does not reduce the misfit.
+    /// Moves to the minimum over non-negative active columns; false, without a move, if `next` does not
+    /// reduce the misfit.
     fn fit(&self, x: &mut Array1<f64>, used: &mut Vec<usize>, next: usize) -> bool {
         let mut is_first = true;
         while !used.is_empty() {
@@ -258,7 +242,7 @@ mod tests {
     use rand_xoshiro::Xoshiro256PlusPlus;
 
     proptest! {
-        /// Karush, Kuhn and Tucker: x ≥ 0, gradient ≥ 0, and one of them 0; with and without a sum that is drawn.
+        /// Karush–Kuhn–Tucker conditions, with and without a target.
         #[test]
         fn the_minimum_meets_its_conditions(seed in 0u64..1000, rows in 1usize..10, columns in 1usize..40) {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
@@ -285,7 +269,8 @@ mod tests {
         let (low, high) = bounds.of_sum(&Array1::ones(1));
         let half = 0.5 * RATIO_95.sqrt();
         assert!((low - (10.0 - half)).abs() < 1e-3 && (high - (10.0 + half)).abs() < 1e-3, "{low} {high}");
-        // A cell without a sensitive sensor has no bound, and one with too small a reading may have none.
+        // A cell without a sensitive sensor has no upper bound, and a small reading may have the lower bound
+        // 0.
         let blind =
             Bounds::new(&Array2::from_shape_vec((1, 2), vec![2.0, 0.0]).unwrap(), &Array1::from(vec![20.0]));
         assert_eq!(blind.of_sum(&Array1::ones(2)).1, f64::INFINITY);
@@ -295,8 +280,8 @@ mod tests {
 
     #[test]
     fn bounds_of_a_mean_are_those_of_two_cells() {
-        // Two sensors, each of one cell at 0 m or 1 m: forces of 20/2 and 10/2 N with a standard deviation of 1/2 N. A mean v has no force
-        // (1 − v)·b = v·a, and the misfit of the nearest one is (v·20 − (1 − v)·10)²/(v² + (1 − v)²).
+        // Two sensors, each of one cell at 0 m or 1 m: forces of 20/2 and 10/2 N with standard deviation 1/2
+        // N. For the mean v, (1 − v)·b = v·a, and the least misfit is (v·20 − (1 − v)·10)²/(v² + (1 − v)²).
         let a = Array2::from_diag(&Array1::from(vec![2.0, 2.0]));
         let bounds = Bounds::new(&a, &Array1::from(vec![20.0, 10.0]));
         let misfit = |v: f64| (v * 20.0 - (1.0 - v) * 10.0).powi(2) / (v * v + (1.0 - v) * (1.0 - v));

@@ -1,4 +1,4 @@
-//! The cells of a surface; each carries a part of the load.
+//! Cells of a surface.
 
 use std::ops::RangeInclusive;
 
@@ -7,27 +7,25 @@ use ndarray::Array2;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::{Extent, UniformLoad, midpoints};
 
-/// Cells along a line.
 const ON_A_LINE: usize = 80;
-/// Cells along the longer side of a plane.
 const ON_A_PLANE: usize = 20;
-/// Midpoints of a cell at which influence functions are averaged, along x and y.
+/// Midpoints for mean influence, along x and y.
 const POINTS_ON_A_LINE: [usize; 2] = [8, 1];
 const POINTS_ON_A_PLANE: [usize; 2] = [3, 3];
 
-/// A surface divided into equal cells, numbered along x and then along y.
+/// Equal cells of a surface, numbered along x, then y.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cells {
-    /// The surface.
+    /// Surface extent.
     pub extent: Extent,
-    /// Cells along x; at least 1.
+    /// Cells along x, at least 1.
     pub columns: usize,
     /// Cells along y; 1 on a line.
     pub rows: usize,
 }
 
 impl Cells {
-    /// 80 cells on a line; on a plane 20 along the longer side, as square as possible.
+    /// Creates 80 cells on a line, or nearly square ones on a plane, 20 on the longer side.
     pub fn new(extent: Extent) -> Self {
         let Some(width_m) = extent.width_m() else { return Self { extent, columns: ON_A_LINE, rows: 1 } };
         let most = ON_A_PLANE as f64;
@@ -38,7 +36,7 @@ impl Cells {
         Self { extent, columns: count(extent.length_m()), rows: count(width_m) }
     }
 
-    /// About `count` cells of a plane, as square as possible, with a number along each side within `sides`.
+    /// Creates about `count` nearly square cells, with numbers per side within `sides`.
     pub fn nearly_square(extent: Extent, count: f64, sides: RangeInclusive<usize>) -> Self {
         let aspect = extent.width_m().unwrap_or(extent.length_m()) / extent.length_m();
         let side = |ratio: f64| ((count * ratio).sqrt().round() as usize).clamp(*sides.start(), *sides.end());
@@ -51,13 +49,13 @@ impl Cells {
         self.columns * self.rows
     }
 
-    /// The sides of a cell in metres; on a line the second is 0.
+    /// Sides in metres; the second is 0 on a line.
     pub fn sides_m(&self) -> [f64; 2] {
         let across = self.extent.width_m().map_or(0.0, |width_m| width_m / self.rows as f64);
         [self.extent.length_m() / self.columns as f64, across]
     }
 
-    /// The length of a cell in metres, or on a plane its area in square metres.
+    /// Length in metres, or area in m².
     pub fn measure(&self) -> f64 {
         let [along, across] = self.sides_m();
         match self.extent {
@@ -66,12 +64,12 @@ impl Cells {
         }
     }
 
-    /// The middles of all cells.
+    /// Centres of all cells.
     pub fn centres(&self) -> impl Iterator<Item = Position> {
         (0..self.len()).map(|cell| self.centre(cell))
     }
 
-    /// The cell that contains a position; the nearest one for a position off the surface.
+    /// Cell of a position, or the nearest.
     pub fn cell_of(&self, position: Position) -> usize {
         let number = |at_m: f64, size_m: f64, count: usize| {
             ((at_m / size_m * count as f64).max(0.0) as usize).min(count - 1)
@@ -81,7 +79,7 @@ impl Cells {
         row * self.columns + column
     }
 
-    /// The mean density of some loads over each cell: N/m on a line, N/m² on a plane.
+    /// Mean density in N/m, or N/m² on a plane.
     pub fn mean_density(&self, loads: &[UniformLoad]) -> Vec<f64> {
         let shared = |a: f64, b: f64, from: f64, to: f64| {
             if b > a { (b.min(to) - a.max(from)).max(0.0) / (b - a) } else { 1.0 }
@@ -98,13 +96,13 @@ impl Cells {
         (0..self.len()).map(density).collect()
     }
 
-    /// The middle of a cell.
+    /// Centre of a cell.
     pub fn centre(&self, cell: usize) -> Position {
         let (from, to) = self.corners(cell);
         Position { x_m: from.x_m.midpoint(to.x_m), y_m: from.y_m.midpoint(to.y_m) }
     }
 
-    /// The distance of a cell's far end from the nearest edge, in metres: on a line from the nearest end.
+    /// Distance of the far side from the nearest edge, in metres.
     pub(super) fn edge_distance_m(&self, cell: usize) -> f64 {
         let (from, to) = self.corners(cell);
         let near = |from_m: f64, to_m: f64, side_m: f64| to_m.min(side_m - from_m);
@@ -112,7 +110,7 @@ impl Cells {
         self.extent.width_m().map_or(along, |width_m| along.min(near(from.y_m, to.y_m, width_m)))
     }
 
-    /// The lower left and the upper right corner of a cell.
+    /// Lower left and upper right corners.
     pub fn corners(&self, cell: usize) -> (Position, Position) {
         let (column, row) = (cell % self.columns, cell / self.columns);
         let [along, across] = self.sides_m();
@@ -120,7 +118,6 @@ impl Cells {
         (corner(column, row), corner(column + 1, row + 1))
     }
 
-    /// The cells that share a side with a cell.
     pub(super) fn neighbours(&self, cell: usize) -> impl Iterator<Item = usize> {
         let (column, row) = (cell % self.columns, cell / self.columns);
         let beside = [
@@ -132,13 +129,11 @@ impl Cells {
         beside.into_iter().flatten()
     }
 
-    /// Points of a cell; the mean over them stands for the mean over the cell.
     pub(super) fn points(&self, cell: usize) -> Vec<Position> {
         let (from, to) = self.corners(cell);
         midpoints(from, to, self.points_a_side())
     }
 
-    /// Number of the points of a cell along x and along y.
     pub(super) fn points_a_side(&self) -> [usize; 2] {
         match self.extent {
             Extent::Line { .. } => POINTS_ON_A_LINE,
@@ -146,8 +141,8 @@ impl Cells {
         }
     }
 
-    /// P: xᵀP·x is the sum of the squared second differences of x along the line, or the bending energy Σ x_uu² + 2·x_uv² +
-    /// x_vv² of x over the plane, lengths in units of a cell's first side. Beyond the edges x is 0, so P is positive definite.
+    /// P: xᵀP·x is the sum of squared second differences, or Σ x_uu² + 2·x_uv² + x_vv² (bending energy) on a
+    /// plane, in cells along x. Beyond the edges x = 0, so P is positive definite.
     pub(super) fn roughness(&self) -> Array2<f64> {
         let mut roughness = Array2::zeros((self.len(), self.len()));
         let [along, across] = self.sides_m();
@@ -170,7 +165,7 @@ impl Cells {
         roughness
     }
 
-    /// All cells with a rim of one cell around them.
+    /// One cell wide.
     fn cells_and_rim(&self) -> impl Iterator<Item = [isize; 2]> {
         let (columns, rows) = (self.columns as isize, self.rows as isize);
         (-1..=rows).flat_map(move |j| (-1..=columns).map(move |i| [i, j]))
@@ -182,7 +177,7 @@ impl Cells {
     }
 }
 
-/// Adds weight·(Σ c_k·x_k)² to a quadratic form; terms without a cell are 0.
+/// Adds weight·(Σ c_k·x_k)².
 fn add_square(form: &mut Array2<f64>, terms: &[(Option<usize>, f64)], weight: f64) {
     let terms: Vec<(usize, f64)> = terms.iter().filter_map(|(cell, c)| Some((((*cell)?), *c))).collect();
     for (i, a) in &terms {

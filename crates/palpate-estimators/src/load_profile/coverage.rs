@@ -1,4 +1,4 @@
-//! Coverage of the 95 % intervals, by where loads lie: a sample of the experiment `load-profiles`.
+//! Interval coverage by load position: a sample of the experiment `load-profiles`.
 
 use super::tests::{beam, clean, layout, noisy};
 use super::*;
@@ -6,10 +6,10 @@ use palpate_numerics::binomial_tail;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Distances of the outermost load's centre from a support, in metres.
+/// Distances of the outermost centre from a support, in metres.
 const DISTANCES_M: [(f64, f64); 3] = [(0.001, 0.01), (0.02, 0.04), (0.1, 0.2)];
 
-/// Readings with as many patches in the profile as there are loads, and how many of their intervals contain the truth.
+/// Readings with the true number of patches.
 #[derive(Debug, Default)]
 struct Held {
     readings: usize,
@@ -48,7 +48,7 @@ impl Held {
     }
 }
 
-/// A load of 1 to 60 mm and 0.5 to 20 N around a centre, as wide as the beam allows.
+/// 1 to 60 mm, 0.5 to 20 N.
 fn load(centre_m: f64, rng: &mut Xoshiro256PlusPlus) -> UniformLoad {
     let widest_m = f64::min(0.06, 2.0 * centre_m.min(0.4 - centre_m));
     let half_m = 0.5 * rng.random_range(0.001..widest_m.max(0.0011));
@@ -81,7 +81,7 @@ fn held(readings: usize, two: bool, (from_m, to_m): (f64, f64), rng: &mut Xoshir
     held
 }
 
-/// The experiment has 93 to 100 % in every row.
+/// The experiment covers 93 to 100 %.
 #[test]
 fn patches_are_held_wherever_they_lie() {
     const READINGS: usize = 12;
@@ -97,13 +97,13 @@ fn patches_are_held_wherever_they_lie() {
     }
 }
 
-/// False where so few of the intervals contain the truth that a coverage of 93 % gives fewer in one sample of a thousand.
+/// False below the 0.001 quantile of a coverage of 93 %.
 fn is_plausible(covered: usize, of: usize) -> bool {
     binomial_tail(of, of - covered, 0.07) > 1e-3
 }
 
-/// No other load has the force of one over the whole beam, so that its interval ends where centre and width are determined as well. The experiment has 96 %
-/// or more of every quantity.
+/// The force is unique, so its interval also determines centre and width. The experiment covers at least 96
+/// %.
 #[test]
 fn the_force_of_a_load_over_the_whole_beam_is_held() {
     const READINGS: usize = 12;

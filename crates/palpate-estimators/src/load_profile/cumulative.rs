@@ -1,33 +1,31 @@
-//! Means of influence functions over stretches and rectangles, of any ends, from one table.
+//! Means of influence functions from cumulative sums.
 
 use super::cells::Cells;
 use super::{LoadChannel, LoadSensors};
 use ndarray::Array2;
 
-/// Nodes of an interpolation along an axis.
+/// Interpolation nodes per axis.
 const STENCIL: usize = 4;
 
-/// Influence functions, over the noise of their sensors, summed from the lower left corner of the surface: the sums at the nodes of a grid, with
-/// cubic interpolation between. A mean over a rectangle is a difference of four of these sums over the area.
+/// Cumulative integrals of influence over noise at grid nodes, with cubic interpolation; four values give a
+/// rectangle.
 pub(super) struct CumulativeInfluence {
     channels: usize,
-    /// Sides of the surface in metres; of a line, 1 across.
+    /// In metres; 1 across on a line.
     sides_m: [f64; 2],
-    /// Nodes along x and along y.
     nodes: [usize; 2],
-    /// Sums in 1/N times the measure, node by node along x and then along y, the channels of a node beside each other.
+    /// In 1/N times length or area, by y, x, channel.
     sums: Vec<f64>,
 }
 
-/// The mean over a rectangle of each channel's influence function, over its noise, in 1/N; with derivatives per metre by its ends.
+/// Mean influence over noise in a rectangle, in 1/N.
 pub(super) struct EvenMean {
     pub value: Vec<f64>,
-    /// Derivatives by the ends along x and along y: the lower and the upper one.
+    /// Per metre, by lower and upper ends along x and y.
     pub slopes: [[Vec<f64>; 2]; 2],
 }
 
 impl CumulativeInfluence {
-    /// The table of the channels that are not dead, from the points of each cell.
     pub fn new(sensors: &LoadSensors, cells: &Cells) -> Self {
         let alive: Vec<&LoadChannel> = sensors.alive().collect();
         let channels = alive.len();
@@ -58,7 +56,7 @@ impl CumulativeInfluence {
         Self { channels, sides_m, nodes, sums }
     }
 
-    /// The means over the cells that gave the table its points, in 1/N: a channel a row, a cell a column.
+    /// Channels × cells, in 1/N.
     pub fn over_cells(&self, cells: &Cells) -> Array2<f64> {
         let [along, across] = cells.points_a_side();
         let sum =
@@ -73,17 +71,17 @@ impl CumulativeInfluence {
         })
     }
 
-    /// The length of a part of the grid along an axis, in metres.
+    /// Node distance in metres.
     pub fn part_m(&self, axis: usize) -> f64 {
         self.sides_m[axis] / (self.nodes[axis] - 1) as f64
     }
 
-    /// The length of an axis, in metres; of a line, 1 across.
+    /// In metres; 1 across on a line.
     pub fn side_m(&self, axis: usize) -> f64 {
         self.sides_m[axis]
     }
 
-    /// The mean between two ends along x and two along y, in metres; the upper ends are beyond the lower ones.
+    /// Upper ends must exceed lower ones.
     pub fn mean(&self, ends_m: [[f64; 2]; 2]) -> EvenMean {
         let [x, y] = [0, 1].map(|axis| ends_m[axis].map(|at_m| self.stencil(axis, at_m)));
         let zeros = || vec![0.0; self.channels];
@@ -106,7 +104,7 @@ impl CumulativeInfluence {
         let area = lengths_m[0] * lengths_m[1];
         value.iter_mut().for_each(|value| *value /= area);
         for (slopes, length_m) in slopes.iter_mut().zip(lengths_m) {
-            // A longer stretch includes the influence beyond its end, and dilutes the rest.
+            // A longer interval adds the influence at its end, and dilutes the rest.
             for (slopes, sign) in slopes.iter_mut().zip([1.0, -1.0]) {
                 slopes
                     .iter_mut()
@@ -117,7 +115,7 @@ impl CumulativeInfluence {
         EvenMean { value, slopes }
     }
 
-    /// Lagrange's polynomials on the nodes around a place.
+    /// Lagrange polynomials.
     fn stencil(&self, axis: usize, at_m: f64) -> Stencil {
         let nodes = self.nodes[axis];
         let count = STENCIL.min(nodes);
@@ -136,7 +134,7 @@ impl CumulativeInfluence {
     }
 }
 
-/// Weights of some nodes beside each other, and their derivatives per metre.
+/// Weights of adjacent nodes, with derivatives per metre.
 struct Stencil {
     first: usize,
     count: usize,
@@ -144,7 +142,7 @@ struct Stencil {
 }
 
 impl Stencil {
-    /// The terms of nodes other than the first, where the sums are 0.
+    /// The first node has sums of 0.
     fn terms(&self) -> impl Iterator<Item = (usize, (f64, f64))> {
         (self.first..).zip(self.terms.into_iter().take(self.count)).filter(|(node, _)| *node > 0)
     }
@@ -165,7 +163,6 @@ mod tests {
     use palpate_mechanics::sensing::Layout;
     use palpate_mechanics::surface::{Surface, UniformLoad};
 
-    /// Means and their slopes by the ends are those of loads that are summed point by point.
     fn check(surface: &dyn Surface, layout: &Layout, ends_m: [[f64; 2]; 2], tolerance: f64) {
         let sensors = LoadSensors::new(surface, layout).unwrap();
         let table = CumulativeInfluence::new(&sensors, &Cells::new(sensors.extent));

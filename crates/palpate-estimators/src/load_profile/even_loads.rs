@@ -1,15 +1,13 @@
-//! Patches as evenly loaded stretches or rectangles: those that a reading does not exclude.
+//! Patches as uniform loads, with likelihood-ratio intervals that do not depend on a prior.
 //!
-//! A profile is shaped by its prior: smooth, and no heavier than the reading requires. Next to a support a heavy load reads like a lighter
-//! one farther in, and there the prior decides. Here no prior decides: a patch is a force F, spread evenly around a centre c over a width w. A
-//! value v of its force, of its centre or of the centre of pressure is in the 95 % interval when some loads with that value leave
-//! ‖y − Σ F·m(c, w)‖² within [`RATIO_95`] of the least that any leave, m being the means of the influence functions over the noise
-//! (the likelihood ratio, profiled over everything else: Pawitan, *In All Likelihood*, 2001, section 3.4).
+//! A patch is a force F, uniform over a width w around a centre c. The 95 % interval of a force, centre or
+//! centre of pressure includes v if some loads with that value have ‖y − Σ F·m(c, w)‖² within [`RATIO_95`] of
+//! the minimum, with mean influences m over noise (profile likelihood: Pawitan, *In All Likelihood*, 2001,
+//! section 3.4).
 //!
-//! The least for a given v is computed without a constraint, as in [`super::bounds`]: the minimum with (v − t)²·ρ² added is the least for its own v.
-//! Minima are by Levenberg–Marquardt, with unknowns clamped to their ranges. Readings are proportional to the square of a width where it is small. So
-//! the unknown is a share s of the square, from the least width, a part of the grid, to the widest at its centre:
-//! w² = w_min² + s·(w_max(c)² − w_min²).
+//! As in [`super::bounds`], the minimum with penalty ρ²·(v − t)² has the least misfit for its own v. Minima
+//! are by Levenberg–Marquardt with clamped unknowns. Readings are linear in the square of a small width, so
+//! the unknown is s in w² = w_min² + s·(w_max(c)² − w_min²), with w_min the node distance.
 
 use super::cells::Cells;
 use super::cumulative::CumulativeInfluence;
@@ -18,28 +16,26 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::{Extent, UniformLoad};
 use palpate_numerics::{Cholesky, chi_squared_critical_value};
 
-/// 95 % quantile of χ² of one.
+/// 95 % quantile of χ², one degree of freedom.
 const RATIO_95: f64 = 3.84;
-/// Share of a side from which on a load is over the whole of it.
+/// Least share of a whole side.
 const WHOLE: f64 = 0.95;
-/// Values of an interval from which a median is computed.
+/// Points for a median.
 const LOOKED_AT: usize = 16;
-/// Negligible misfit.
 const NEGLIGIBLE: f64 = 1e-3;
-/// Share by which the diagonal is raised in the projection of the score test.
+/// Damping of the score test.
 const SCORE_DAMPING: f64 = 1e-9;
-/// Steps of a minimisation; a dozen is usual.
+/// A dozen is usual.
 const MOST_STEPS: usize = 200;
-/// Share by which the diagonal of the normal equations is raised at first, at least, and at most.
+/// Relative damping of the normal equations.
 const FIRST_DAMPING: f64 = 1e-4;
 const LEAST_DAMPING: f64 = 1e-12;
 const MOST_DAMPING: f64 = 1e6;
-/// Most doublings of the step in a search for an end; beyond them the value has no end.
+/// Beyond these doublings of a step the value is unbounded.
 const MOST_DOUBLINGS: usize = 40;
-/// Halvings of the interval that contains an end.
 const MOST_HALVINGS: usize = 20;
 
-/// Loads that explain a reading: as many as there are patches.
+/// Uniform loads, one per patch.
 pub(super) struct EvenLoads<'a> {
     table: &'a CumulativeInfluence,
     y: &'a Array1<f64>,
@@ -47,7 +43,7 @@ pub(super) struct EvenLoads<'a> {
     best: Minimum,
 }
 
-/// Unknowns at a minimum: of each load its force, and along each axis its centre and the share of its width.
+/// Per load the force, then per axis the centre and width share s.
 #[derive(Clone)]
 struct Minimum {
     unknowns: Vec<f64>,
@@ -57,21 +53,21 @@ struct Minimum {
 /// Value with an interval.
 #[derive(Clone, Copy)]
 pub(super) enum Aim {
-    /// Force of a load, in newtons.
+    /// Of a load, in newtons.
     Force(usize),
-    /// Force of all loads, in newtons.
+    /// In newtons.
     Total,
-    /// Centre of a load along an axis, in metres.
+    /// Of a load along an axis, in metres.
     Centre(usize, usize),
-    /// Centre of pressure along an axis, in metres.
+    /// Along an axis, in metres.
     CentreOfPressure(usize),
 }
 
-/// A value that is drawn to the target `t` with the weight ρ².
+/// Value, target t and ρ².
 type Drawn = (Aim, f64, f64);
 
 impl<'a> EvenLoads<'a> {
-    /// The loads of least misfit, from those of a profile; `None` without any.
+    /// Fits from a profile's loads.
     pub fn new(
         table: &'a CumulativeInfluence,
         y: &'a Array1<f64>,
@@ -80,7 +76,8 @@ impl<'a> EvenLoads<'a> {
     ) -> Option<Self> {
         let no_loads = Minimum { unknowns: Vec::new(), misfit: f64::INFINITY };
         let loads = Self { table, y, dimensions: extent.dimensions(), best: no_loads };
-        // Beside a support a profile is drawn inwards: a heavier load nearer to the support may have the same moment.
+        // The profile's prior moves loads inwards; a larger force nearer to the support may have the same
+        // moment.
         let nearer = [1.0, 0.5, 0.25].into_iter();
         let starts = nearer.map(|nearer| {
             starts.iter().flat_map(|start| loads.unknowns_of(start, nearer)).collect::<Vec<f64>>()
@@ -88,7 +85,7 @@ impl<'a> EvenLoads<'a> {
         loads.fit_from(starts.filter(|start| !start.is_empty()).collect())
     }
 
-    /// The loads of least misfit from several starts, along x; `None` without any.
+    /// Best of several starts, along x.
     fn fit_from(&self, starts: Vec<Vec<f64>>) -> Option<Self> {
         let fits = starts.into_iter().map(|start| self.minimum(start, None, &[]));
         let best =
@@ -99,8 +96,7 @@ impl<'a> EvenLoads<'a> {
         Some(Self { table: self.table, y: self.y, dimensions: self.dimensions, best })
     }
 
-    /// The fit of one more load than these: from each of these in two halves, and from a load in each cell where the score test has a maximum.
-    /// `influence` has the mean influence of each cell, a cell a column.
+    /// Starts from halves of each load, and from maxima of the score test; `influence` is channels × cells.
     pub fn with_one_more(&self, cells: &Cells, influence: &Array2<f64>) -> Option<Self> {
         let loads: Vec<UniformLoad> = (0..self.count()).map(|number| self.fitted_load(number)).collect();
         let mut starts = Vec::new();
@@ -117,7 +113,6 @@ impl<'a> EvenLoads<'a> {
         self.fit_from(starts)
     }
 
-    /// Both halves of a load along each axis.
     fn halves(&self, load: &UniformLoad) -> Vec<[UniformLoad; 2]> {
         let (from, to, middle) = (load.from(), load.to(), load.centre());
         let half = |from, to| UniformLoad::new(from, to, 0.5 * load.force_n());
@@ -134,9 +129,9 @@ impl<'a> EvenLoads<'a> {
         halves
     }
 
-    /// Loads of one cell where a load lowers the misfit the most to first order, all unknowns of these loads being fitted again (Rao's score
-    /// test): with S the derivatives of the reading, r the residual and a′ the influence of the cell less its projection on S, the gain is
-    /// (a′·r)²/|a′|² for a′·r > 0.
+    /// Single-cell loads with the greatest misfit reduction to first order (Rao's score test): (a′·r)²/|a′|²
+    /// for a′·r > 0, with r the residual and a′ the influence minus its projection on the reading's
+    /// derivatives.
     fn additions(&self, cells: &Cells, influence: &Array2<f64>) -> Vec<UniformLoad> {
         let (residuals, slopes) = self.residuals(&self.best.unknowns);
         let hessian = slopes.dot(&slopes.t());
@@ -163,29 +158,24 @@ impl<'a> EvenLoads<'a> {
         (0..cells.len()).filter(is_maximum).map(load).collect()
     }
 
-    /// Number of loads.
     pub fn count(&self) -> usize {
         self.best.unknowns.len() / self.each()
     }
 
-    /// Number of the unknowns of all loads.
     pub fn unknowns(&self) -> usize {
         self.best.unknowns.len()
     }
 
-    /// One of the loads, as fitted.
     pub fn fitted_load(&self, number: usize) -> UniformLoad {
         self.load(&self.best.unknowns[number * self.each()..][..self.each()])
     }
 
-    /// The misfit of these loads.
     pub fn misfit(&self) -> f64 {
         self.best.misfit
     }
 
-    /// One of the loads, in the middle of those that the reading does not distinguish: the likeliest at the posterior median of its centre along each
-    /// axis. The prior is flat over the 95 % interval, and everything else is the likeliest there. (Where force and place trade off, the likeliest
-    /// load of all depends on chance.)
+    /// Load at the posterior median of its centre, with a flat prior over the interval and the others
+    /// refitted. The load of least misfit depends on chance where force and place trade off.
     pub fn middle_load(&self, number: usize) -> UniformLoad {
         let mut middle = self.best.unknowns.clone();
         let centres: Vec<usize> =
@@ -197,7 +187,6 @@ impl<'a> EvenLoads<'a> {
         self.load(&found.unknowns[number * self.each()..][..self.each()])
     }
 
-    /// The posterior median of an unknown over its interval.
     fn median(&self, unknown: usize, (low, high): (f64, f64)) -> f64 {
         let (least, most) = self.range(unknown);
         let step = (high - low) / LOOKED_AT as f64;
@@ -222,14 +211,13 @@ impl<'a> EvenLoads<'a> {
         self.best.unknowns[unknown]
     }
 
-    /// The load of some unknowns.
     fn load(&self, unknowns: &[f64]) -> UniformLoad {
         let [[left, right], [low, high]] = self.ends_m(unknowns);
         let corner = |x_m, y_m| Position { x_m, y_m: if self.dimensions > 1 { y_m } else { 0.0 } };
         UniformLoad::new(corner(left, low), corner(right, high), unknowns[0])
     }
 
-    /// The 95 % interval of a value; the upper end of a force is infinite where the reading gives none.
+    /// Upper ends may be infinite.
     pub fn interval_95(&self, aim: Aim) -> (f64, f64) {
         let whole = match aim {
             Aim::Force(_) | Aim::Total => (0.0, f64::INFINITY),
@@ -240,7 +228,6 @@ impl<'a> EvenLoads<'a> {
         (low.unwrap_or(whole.0), high.unwrap_or(whole.1))
     }
 
-    /// Number of the unknowns of a load.
     fn each(&self) -> usize {
         1 + 2 * self.dimensions
     }
@@ -264,7 +251,7 @@ impl<'a> EvenLoads<'a> {
         unknowns
     }
 
-    /// Width along an axis in metres, with its derivatives by the centre and by the share.
+    /// Width in metres, with derivatives by centre and share.
     fn width_m(&self, axis: usize, centre_m: f64, share: f64) -> (f64, f64, f64) {
         let (side_m, least_m) = (self.table.side_m(axis), self.table.part_m(axis));
         let widest_m = 2.0 * centre_m.min(side_m - centre_m);
@@ -274,7 +261,6 @@ impl<'a> EvenLoads<'a> {
         (width_m, share * widest_m * inwards / width_m, 0.5 * spread / width_m)
     }
 
-    /// Ends of a load along x and y, in metres.
     fn ends_m(&self, unknowns: &[f64]) -> [[f64; 2]; 2] {
         let mut ends_m = [0, 1].map(|axis| [0.0, self.table.side_m(axis)]);
         for (axis, place) in unknowns[1..].chunks(2).enumerate() {
@@ -284,7 +270,7 @@ impl<'a> EvenLoads<'a> {
         ends_m
     }
 
-    /// Residuals and their derivatives, an unknown a row.
+    /// Derivatives are unknowns × channels.
     fn residuals(&self, unknowns: &[f64]) -> (Array1<f64>, Array2<f64>) {
         let mut residuals = -self.y.clone();
         let mut slopes = Array2::zeros((unknowns.len(), self.y.len()));
@@ -342,7 +328,7 @@ impl<'a> EvenLoads<'a> {
         slope
     }
 
-    /// The range of an unknown. A force of 0 would have no centre.
+    /// A force of 0 would have no centre.
     fn range(&self, unknown: usize) -> (f64, f64) {
         match unknown % self.each() {
             0 => (LEAST_FORCE_N, f64::INFINITY),
@@ -355,7 +341,7 @@ impl<'a> EvenLoads<'a> {
         }
     }
 
-    /// The minimum of the misfit near some unknowns, with the unknowns `held` fixed; a value may be drawn towards a target.
+    /// Local minimum with the unknowns `held` fixed.
     fn minimum(&self, mut unknowns: Vec<f64>, drawn: Option<Drawn>, held: &[usize]) -> Minimum {
         let mut damping = FIRST_DAMPING;
         let mut here = self.normal_equations(&unknowns, drawn);
@@ -363,7 +349,7 @@ impl<'a> EvenLoads<'a> {
             let tried = self.step(&unknowns, &here, damping, held);
             let there = tried.as_ref().map(|tried| self.normal_equations(tried, drawn));
             let gain = there.as_ref().map_or(f64::NEG_INFINITY, |there| here.cost - there.cost);
-            // Along a valley, as of force and width, a damped step gains little anywhere.
+            // Where unknowns trade off, such as force and width, a damped step gains little.
             let is_there = gain.abs() < 0.01 * NEGLIGIBLE && damping <= LEAST_DAMPING;
             if let (Some(tried), Some(there), true) = (tried, there, gain > 0.0) {
                 (unknowns, here) = (tried, there);
@@ -398,8 +384,7 @@ impl<'a> EvenLoads<'a> {
         found
     }
 
-    /// Unknowns after a Levenberg–Marquardt step. Unknowns at an end of their range stay there or move away from it. `None` where the equations have
-    /// no solution.
+    /// Levenberg–Marquardt step within the ranges.
     fn step(
         &self,
         unknowns: &[f64],
@@ -428,7 +413,7 @@ impl<'a> EvenLoads<'a> {
         }
     }
 
-    /// Standard deviation of a value to first order; `None` where the reading does not determine it.
+    /// To first order; `None` if undetermined.
     pub fn sd(&self, aim: Aim) -> Option<f64> {
         let unknowns = &self.best.unknowns;
         let here = self.normal_equations(unknowns, None);
@@ -438,25 +423,24 @@ impl<'a> EvenLoads<'a> {
         Some(sd.min(self.value_at(aim, unknowns))).filter(|sd| sd.is_finite() && *sd > 0.0)
     }
 
-    /// The value at which the least misfit reaches the largest one that is not excluded, found by steps of `step` to begin with; `None` where there is
-    /// no end but that of the surface.
+    /// Value with the critical misfit; `None` without an end on the surface.
     fn end(&self, aim: Aim, step: f64) -> Option<f64> {
         let (end, unknowns) = self.end_at(aim, step, RATIO_95)?;
         if unknowns.chunks(self.each()).any(|load| self.is_whole(load)) {
-            // No other load has the force of this one, so that its force determines centres and widths as well.
+            // The force of a load over the whole surface is unique, so it also determines centres and widths.
             let ratio = chi_squared_critical_value(0.05, self.each());
             return self.end_at(aim, step, ratio).map(|(end, _)| end);
         }
         Some(end)
     }
 
-    /// True of a load over the whole surface.
+    /// True over the whole surface.
     fn is_whole(&self, load: &[f64]) -> bool {
         let ends_m = self.ends_m(load);
         (0..self.dimensions).all(|axis| ends_m[axis][1] - ends_m[axis][0] >= WHOLE * self.table.side_m(axis))
     }
 
-    /// The end of the interval for misfits that exceed the least by `ratio` at most, with the unknowns there.
+    /// End for misfits up to the least plus `ratio`, with its unknowns.
     fn end_at(&self, aim: Aim, step: f64, ratio: f64) -> Option<(f64, Vec<f64>)> {
         let most = self.best.misfit + ratio;
         let stiffness = 1.0 / (step * step);
@@ -470,8 +454,8 @@ impl<'a> EvenLoads<'a> {
             }
             let (was, is) = (self.value_at(aim, &inside.unknowns), self.value_at(aim, &found.unknowns));
             (inside, from) = (found, t);
-            // The value does not follow the target. (A value that hardly follows may be determined far better than to first order, as the force of a
-            // load of greatest width.)
+            // The value does not move to the target. A value that moves little may be determined far better
+            // than to first order, such as the force of a load of greatest width.
             if way.abs() > 8.0 * step.abs() && (is - was).abs() < 1e-9 * step.abs() {
                 return (!self.is_at_edge(aim, &inside.unknowns)).then_some((is, inside.unknowns));
             }
@@ -480,7 +464,7 @@ impl<'a> EvenLoads<'a> {
         None
     }
 
-    /// The value between two targets t at which the least misfit is the largest one.
+    /// Critical value between two targets t.
     fn between(
         &self,
         (aim, stiffness, most): (Aim, f64, f64),
@@ -503,8 +487,8 @@ impl<'a> EvenLoads<'a> {
         (!self.is_at_edge(aim, &inside.1.unknowns)).then_some((end, inside.1.unknowns))
     }
 
-    /// True for a value of a load with a centre at an end of its range. The value has no bound then: a narrower load could be nearer to the edge, and
-    /// harder.
+    /// At an end of the centre's range the value is unbounded: a narrower load could be nearer to the edge,
+    /// with a larger force.
     fn is_at_edge(&self, aim: Aim, unknowns: &[f64]) -> bool {
         let is_at_end = |i: usize| {
             let (least, most) = self.range(i);
@@ -521,19 +505,18 @@ impl<'a> EvenLoads<'a> {
     }
 }
 
-/// Least force of a load, in newtons.
 const LEAST_FORCE_N: f64 = 1e-12;
 
-/// Half of the misfit's derivatives, to first order in the residuals' own.
+/// Half of the misfit's derivatives, by Gauss–Newton.
 struct NormalEquations {
     misfit: f64,
-    /// The misfit, with the penalty on the drawn value.
+    /// Misfit with penalty.
     cost: f64,
     gradient: Array1<f64>,
     hessian: Array2<f64>,
 }
 
-/// Solves the listed rows and columns for the same rows of `right`, with the diagonal raised by a share; `None` for a singular matrix.
+/// Solves the listed rows with a relatively increased diagonal.
 fn solve(hessian: &Array2<f64>, listed: &[usize], share: f64, right: &Array1<f64>) -> Option<Array1<f64>> {
     if listed.is_empty() {
         return None;
@@ -557,9 +540,9 @@ mod tests {
     use super::*;
     use palpate_mechanics::sensing::{Layout, SensorKind};
 
-    /// A deflection of a simple beam is a·F times a quadratic in a², a being the place of F on the near side of the sensor. It determines F·c and the
-    /// mean square c² + w²/4 of a³ over a, but no width apart from the centre. So the centre ranges from R/√2, where the load begins at the support,
-    /// to R = √(c² + w²/4), where it has no width, and the force from F·c/R on.
+    /// A beam's deflection is a·F times a quadratic in a², with a the place of F on the near side of the
+    /// sensor. It determines F·c and R² = c² + w²/4, but not w alone. The centre ranges from R/√2, with the
+    /// load beginning at the support, to R, with w = 0; the force is at least F·c/R.
     #[test]
     fn loads_that_read_alike_are_in_the_interval() {
         let beam = beam();

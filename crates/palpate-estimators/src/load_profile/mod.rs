@@ -1,23 +1,19 @@
-//! Load profiles: how force is spread over a surface, from one reading.
+//! Load profiles: force distribution over a surface from one reading.
 //!
-//! A load p(a) ≥ 0 is read as y_i = ∫ f_i(a)·p(a) da + noise, where f_i is the influence function of sensor i. A few readings do
-//! not determine a whole function, so p is the non-negative function that is as smooth as the reading allows:
+//! A load p(a) ≥ 0 gives y_i = ∫ f_i(a)·p(a) da + noise, with influence functions f_i:
 //!
-//! 1. p is a force in each of n cells ([`Cells`]); A holds each sensor's mean influence over each cell, in units of its noise.
-//! 2. For a smoothness λ, x minimises ½·‖A·x − y‖² + ½·λ·xᵀP·x + μ·Σx over x ≥ 0, where xᵀP·x sums the squares of second
-//!    differences (the bending energy on a plane), with no load beyond the edges. μ = n/F makes the force of a cell
-//!    exponentially distributed with mean F/n, the maximum-entropy distribution of a non-negative force with that mean: load where hardly any
-//!    sensor is sensitive, as next to a support, is not invented.
-//! 3. Each smoothness is weighted by its evidence, the probability of the reading under it, in the Gaussian approximation on the
-//!    cells that are not zero; profile and covariance are the mixture over all λ.
-//! 4. Patches are the connected parts that carry load, and more where the reading needs more even loads to be explained (`patch_number`). Their
-//!    forces and centres, and the centre of pressure, have the intervals of even loads, which do not depend on a prior. Where the mixture's values
-//!    are outside of these intervals, those of the even loads replace them. Where no even loads explain the reading, the intervals are those of loads
-//!    of any shape (`bounds`).
-//! 5. The whole force is bounded over loads of any shape.
+//! 1. Each of n cells ([`Cells`]) has a force; A is the mean influence of cells on sensors, over noise.
+//! 2. For a smoothness λ, x minimises ½·‖A·x − y‖² + ½·λ·xᵀP·x + μ·Σx over x ≥ 0. xᵀP·x is the sum of squared
+//!    second differences, without load beyond the edges. μ = n/F is the maximum-entropy prior of forces with
+//!    mean F/n, which suppresses load in insensitive places.
+//! 3. Profile and covariance are mixed over λ by evidence, in the Gaussian approximation on non-zero cells.
+//! 4. Patches are connected loaded parts, or more if the reading requires more uniform loads
+//!    (`patch_number`). Intervals are those of uniform loads, without a prior, or else of any shape
+//!    (`bounds`); values outside are replaced.
+//! 5. The total is bounded over loads of any shape.
 //!
-//! The method is penalised non-negative least squares in Bayesian dress: MacKay, *Bayesian Interpolation*, Neural
-//! Computation 4 (1992), for the evidence; Jaynes, *Prior Probabilities*, IEEE Trans. SSC 4 (1968), for the exponential prior.
+//! Sources: MacKay, *Bayesian Interpolation*, Neural Computation 4 (1992), for the evidence; Jaynes, *Prior
+//! Probabilities*, IEEE Trans. SSC 4 (1968), for the prior.
 
 mod bounds;
 mod cells;
@@ -50,55 +46,55 @@ use patch_number::{PatchLoads, Tables};
 use patches::{centre_of, find_patches, holds, mean_position, nearest};
 use smoothness::{Mixture, Problem};
 
-/// One channel of a reading.
+/// Channel.
 #[derive(Clone)]
 pub struct LoadChannel<'a> {
-    /// Influence function: its reading per newton.
+    /// Reading per newton.
     pub influence: Arc<dyn InfluenceFunction + 'a>,
-    /// Reading without load, in its SI unit.
+    /// Reading without load.
     pub offset: f64,
-    /// Standard deviation of its noise, in its SI unit; greater than 0.
+    /// Noise standard deviation, greater than 0.
     pub noise_sd: f64,
 }
 
-/// The channels of a reading, `None` for those that are dead.
+/// Channels of a bench.
 #[derive(Clone)]
 pub struct LoadSensors<'a> {
-    /// The surface.
+    /// Surface extent.
     pub extent: Extent,
-    /// Channels, in the order of a reading.
+    /// Channels; `None` if disabled.
     pub channels: Vec<Option<LoadChannel<'a>>>,
 }
 
-/// A setup that cannot be used for load profiles.
+/// Unsuitable setup.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LoadSensorsError {
-    /// A surface without a model or fitted influence functions.
+    /// No model or fitted influence functions.
     #[error(
         "a measured surface has no influence functions of a spread load; give a surface with a model, such as a beam"
     )]
     NoModel,
-    /// A live sensor has no noise, or all sensors are dead.
+    /// No noise, or only disabled sensors.
     #[error(transparent)]
     Noise(#[from] NoiseError),
-    /// The equations of the surface have no solution in balance.
+    /// Unsolvable surface.
     #[error("the equations of the surface could not be solved: {error}; {help}", error = .0, help = .0.help())]
     Surface(#[from] Unsolvable),
 }
 
 impl<'a> LoadSensors<'a> {
-    /// The sensors of `layout` under a surface with a model. The noise of each is √(σ² + q²/12), with its resolution q.
+    /// Creates sensors on a surface with a model; the noise is √(σ² + q²/12) with resolution q.
     ///
     /// # Errors
-    /// [`LoadSensorsError`] for a live sensor without noise, for a layout of dead sensors, or for a surface that cannot be solved.
+    /// [`LoadSensorsError`].
     pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Result<Self, LoadSensorsError> {
         Self::new_watched(surface, layout, Watch::NONE)
     }
 
-    /// The sensors of [`LoadSensors::new`], watched while the surface is solved.
+    /// As [`LoadSensors::new`], with a watch.
     ///
     /// # Errors
-    /// As for [`LoadSensors::new`]; where the watch stopped it, [`LoadSensorsError::Surface`] with [`Unsolvable::Cancelled`].
+    /// [`LoadSensorsError`], also by cancellation.
     pub fn new_watched(
         surface: &'a dyn Surface,
         layout: &Layout,
@@ -115,30 +111,30 @@ impl<'a> LoadSensors<'a> {
         Ok(Self { extent: surface.extent(), channels })
     }
 
-    /// The sensors of a setup, by mechanics.
+    /// Creates the sensors of a setup with a model.
     ///
     /// # Errors
-    /// [`LoadSensorsError`] for a surface without a model, a live sensor without noise, or a layout of dead sensors.
+    /// [`LoadSensorsError`].
     pub fn from_setup(setup: &'a Setup) -> Result<Self, LoadSensorsError> {
         Self::from_setup_watched(setup, Watch::NONE)
     }
 
-    /// The sensors of [`LoadSensors::from_setup`], watched while the surface is solved.
+    /// As [`LoadSensors::from_setup`], with a watch.
     ///
     /// # Errors
-    /// As for [`LoadSensors::from_setup`] and [`LoadSensors::new_watched`].
+    /// [`LoadSensorsError`], also by cancellation.
     pub fn from_setup_watched(setup: &'a Setup, watch: Watch) -> Result<Self, LoadSensorsError> {
         let model = setup.surface().model().ok_or(LoadSensorsError::NoModel)?;
         Self::new_watched(model, setup.layout(), watch)
     }
 
-    /// The channels that are not dead.
+    /// Enabled channels.
     pub fn alive(&self) -> impl Iterator<Item = &LoadChannel<'a>> {
         self.channels.iter().flatten()
     }
 }
 
-/// Turns readings of one bench into load profiles.
+/// Estimator of load profiles.
 ///
 /// ```
 /// use palpate_estimators::{load_profile::Profiler, setup::Setup, simulate::simulate_loads};
@@ -158,65 +154,64 @@ pub struct Profiler<'a> {
     cells: Cells,
     problem: Problem,
     cumulative: CumulativeInfluence,
-    /// Bound of the misfit, exceeded by noise in one of a thousand readings.
+    /// Goodness-of-fit bound, error rate 0.001.
     worst_misfit: f64,
 }
 
-/// A load, estimated from one reading.
+/// Estimated load.
 #[derive(Clone, Debug)]
 pub struct LoadProfile {
-    /// Status of the profile: located; ambiguous, when the number of patches is not resolved; no contact; or outside the model, when no load explains
-    /// the reading within its noise.
+    /// Status; ambiguous means an unresolved number of patches.
     pub status: Status,
-    /// The cells of the surface.
+    /// Surface cells.
     pub cells: Cells,
-    /// Force of each cell, in newtons.
+    /// Cell forces in newtons.
     pub forces_n: Vec<f64>,
-    /// Covariance of the cells' forces, in N².
+    /// Covariance of cell forces in N².
     pub covariance_n2: Array2<f64>,
-    /// The whole force, in newtons: their sum, or that of the patches where even loads exclude it.
+    /// Total force in newtons, of cells, or of patches if uniform loads exclude it.
     pub total_n: f64,
-    /// Standard deviation of the cells' sum, by the mixture.
+    /// Standard deviation of the cell total.
     pub total_sd_n: f64,
-    /// Bounds of the sum.
+    /// Bounds of the total.
     pub bounds: ForceBounds,
-    /// Centre of the force in the patches, without load beside an edge that the sensors do not detect; `None` without load.
+    /// Centre of pressure; `None` without load.
     pub centre: Option<CentreOfPressure>,
-    /// The patches that carry load, along x.
+    /// Patches along x.
     pub patches: Vec<Patch>,
-    /// Reading of each channel under this load, in its SI unit; `None` for dead channels.
+    /// Fitted reading; `None` if disabled.
     pub fitted: Vec<Option<f64>>,
-    /// Reading less fitted, over the standard deviation of the noise; `None` for dead channels.
+    /// Residuals over noise; `None` if disabled.
     pub residuals: Vec<Option<f64>>,
-    /// The least sum of squared residuals of any smoothness, or of even loads in the places of the patches.
+    /// Least sum of squared residuals.
     pub misfit: f64,
-    /// Bound of the misfit, exceeded by noise in one of a thousand readings, for any load.
+    /// Goodness-of-fit bound of the misfit, error rate 0.001.
     pub worst_misfit: f64,
-    /// λ of the most probable smoothness, in 1/N²; `None` without load.
+    /// Most probable λ, in 1/N²; `None` without load.
     pub smoothness: Option<f64>,
 }
 
-/// 95 % intervals of a load's whole force, over loads of any shape; an upper end is infinite where the reading does not bound it.
+/// 95 % intervals of the total force for any shape, possibly infinite.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ForceBounds {
-    /// Interval of the whole force, in newtons.
+    /// Total, in newtons.
     pub total_95_n: (f64, f64),
-    /// Distance from the edges, in metres, within which a load of this force cannot be distinguished from a harder one at the edge.
+    /// Distance from the edges, in metres, within which a load reads like a larger force at the edge.
     pub margin_m: f64,
-    /// Interval of the whole force, in newtons, if no load lies within that distance.
+    /// Total in newtons, without load within that distance.
     pub seen_95_n: (f64, f64),
 }
 
 impl<'a> Profiler<'a> {
-    /// A profiler for readings of a setup, by mechanics.
+    /// Creates a profiler of a setup.
     ///
     /// # Errors
-    /// [`LoadSensorsError`] as for [`LoadSensors::from_setup`].
+    /// [`LoadSensorsError`].
     pub fn from_setup(setup: &'a Setup) -> Result<Self, LoadSensorsError> {
         Ok(Self::new(LoadSensors::from_setup(setup)?))
     }
 
-    /// A profiler for readings of these sensors.
+    /// Creates a profiler.
     pub fn new(sensors: LoadSensors<'a>) -> Self {
         let cells = Cells::new(sensors.extent);
         let worst_misfit = misfit_bound(sensors.alive().count());
@@ -225,26 +220,26 @@ impl<'a> Profiler<'a> {
         Self { sensors, cells, problem, cumulative, worst_misfit }
     }
 
-    /// The cells of its profiles.
+    /// Cells of the profiles.
     pub fn cells(&self) -> Cells {
         self.cells
     }
 
-    /// The sensors that it reads.
+    /// Sensors.
     pub fn sensors(&self) -> &LoadSensors<'a> {
         &self.sensors
     }
 
-    /// The load, estimated from a reading: one finite value a channel, in SI units.
+    /// Estimates the load from a reading in SI units.
     ///
     /// # Errors
-    /// [`ReadingError`] for another number of channels or a value that is not finite.
+    /// [`ReadingError`].
     pub fn profile(&self, reading: &[f64]) -> Result<LoadProfile, ReadingError> {
         ReadingError::check(reading, self.sensors.channels.len())?;
         let channels = self.sensors.channels.iter().zip(reading);
         let whitened = channels.filter_map(|(channel, value)| {
             let channel = channel.as_ref()?;
-            // Clamped, so that the squares of huge values are finite.
+            // Clamped, so that squares of huge values are finite.
             Some(((value - channel.offset) / channel.noise_sd).clamp(-LARGEST, LARGEST))
         });
         let y: Array1<f64> = whitened.collect();
@@ -300,7 +295,6 @@ impl<'a> Profiler<'a> {
         })
     }
 
-    /// Bounds of the force by a whitened reading, over loads of any shape.
     fn bounds(&self, shapes: &Bounds, y: &Array1<f64>, total_n: f64) -> ForceBounds {
         let influence = &self.problem.influence;
         let cells = self.cells.len();
@@ -315,7 +309,7 @@ impl<'a> Profiler<'a> {
         ForceBounds { total_95_n, margin_m, seen_95_n: holding(of_seen, total_n) }
     }
 
-    /// Even loads that explain a whitened reading; `None` where their misfit exceeds that by noise.
+    /// `None` if the misfit exceeds the noise.
     fn patch_loads(
         &'a self,
         shapes: &Bounds,
@@ -332,8 +326,8 @@ impl<'a> Profiler<'a> {
         PatchLoads::new(&tables, y, &starts).filter(|even| even.reported.misfit() <= self.worst_misfit)
     }
 
-    /// Gives patches, their centre and their sum the number and the intervals of even loads, and the values of these loads where the intervals do not
-    /// contain those of the profile.
+    /// Applies the number and intervals of uniform loads, and their values where these intervals exclude the
+    /// profile's.
     fn follow(
         &self,
         PatchLoads { reported, unresolved }: &PatchLoads,
@@ -367,12 +361,12 @@ impl<'a> Profiler<'a> {
             centre.move_to(mean_position(patches));
             *total_n = patches.iter().map(|patch| patch.force_n).sum();
         }
-        // Even loads may be narrower than a cell.
+        // Uniform loads may be narrower than a cell.
         bounds.total_95_n = holding(hull(bounds.total_95_n, of_total), *total_n);
         bounds.seen_95_n = holding(bounds.seen_95_n, *total_n);
     }
 
-    /// Gives patches and their centre the bounds of loads of any shape. The loads of a patch are those in the cells nearest to it.
+    /// Applies the bounds of any shape, with cells assigned to the nearest patch.
     fn take_bounds(&self, bounds: &Bounds, patches: &mut [Patch], centre: &mut CentreOfPressure) {
         let nearest: Vec<Option<usize>> = self.cells.centres().map(|place| nearest(patches, place)).collect();
         for (number, patch) in patches.iter_mut().enumerate() {
@@ -387,8 +381,7 @@ impl<'a> Profiler<'a> {
         centre.take_bounds(bounds, &self.cells, &everything);
     }
 
-    /// Cells beside an edge in which a load of this force cannot be distinguished from one at the edge: its distance from there is within 1.96 standard
-    /// deviations of its limit.
+    /// Edge cells within 1.96 standard deviations of the edge, by their limit.
     fn blind_cells(&self, force_n: f64) -> Vec<usize> {
         let extent = self.cells.extent;
         let is_blind = |cell: &usize| -> bool {
@@ -401,7 +394,7 @@ impl<'a> Profiler<'a> {
             within(x_m, extent.length_m(), limit.sd_x_m)
                 || extent.width_m().is_some_and(|width_m| within(y_m, width_m, limit.sd_y_m))
         };
-        // From the edges inwards, as long as such cells follow.
+        // From the edges inwards, without gaps.
         let Cells { columns, rows, .. } = self.cells;
         let from_edge = |cell: &usize| {
             let (column, row) = (cell % columns, cell / columns);
@@ -420,7 +413,7 @@ impl<'a> Profiler<'a> {
         blind
     }
 
-    /// Resolution of this layout at the smoothness of a profile; `None` for a profile without load.
+    /// Resolution at the profile's smoothness; `None` without load.
     pub fn resolution(&self, profile: &LoadProfile) -> Option<Resolution> {
         let (problem, cells) = (&self.problem, self.cells);
         let hessian = &problem.gram + &(profile.smoothness? * &problem.roughness);
@@ -432,7 +425,6 @@ impl<'a> Profiler<'a> {
         Some(Resolution { cells, kernels, widths_m })
     }
 
-    /// Fitted reading and residual of each channel.
     fn fitted(&self, y: &Array1<f64>, forces: &Array1<f64>) -> (Vec<Option<f64>>, Vec<Option<f64>>) {
         let explained = self.problem.influence.dot(forces);
         let mut each = explained.iter().zip(y);
@@ -446,7 +438,7 @@ impl<'a> Profiler<'a> {
 }
 
 impl LoadProfile {
-    /// Density of the load in a cell and its 95 % interval, clipped at 0: N/m on a line, N/m² on a plane.
+    /// Density with 95 % interval, clipped at 0, in N/m or N/m².
     pub fn density(&self, cell: usize) -> (f64, (f64, f64)) {
         let measure = self.cells.measure();
         let (force, sd) = (self.forces_n[cell], self.covariance_n2[[cell, cell]].sqrt());
@@ -454,29 +446,28 @@ impl LoadProfile {
         (force / measure, (low.max(0.0) / measure, high / measure))
     }
 
-    /// Standard deviation of the density in a cell: N/m on a line, N/m² on a plane.
+    /// Standard deviation of the density, in N/m or N/m².
     pub fn density_sd(&self, cell: usize) -> f64 {
         self.covariance_n2[[cell, cell]].sqrt() / self.cells.measure()
     }
 }
 
-/// Least standard deviations for one of several patches.
+/// Cramér–Rao bounds of one patch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PatchLimit {
-    /// Standard deviation of its centre along x, in metres.
+    /// Standard deviation of the centre along x, in metres.
     pub sd_x_m: f64,
-    /// Standard deviation of its centre along y, in metres; 0 on a line.
+    /// Standard deviation of the centre along y, in metres.
     pub sd_y_m: f64,
-    /// Standard deviation of its force, in newtons.
+    /// Standard deviation of the force, in newtons.
     pub sd_force_n: f64,
 }
 
-/// The limits of patches that are each loaded evenly, of known number and sizes: the diagonal of the inverse of the Fisher
-/// information Σ_i ∇m_i·∇m_iᵀ/σ_i², where m_i is what sensor i reads of all patches and ∇ goes over all centres and forces
-/// (Kay, *Fundamentals of Statistical Signal Processing: Estimation Theory*, 1993, section 3.9). `None` where the readings do
-/// not determine them all.
+/// Cramér–Rao bounds of uniform patches of known number and sizes: the inverse Fisher information (Σ_i
+/// ∇m_i·∇m_iᵀ/σ_i²)⁻¹ of centres and forces, with readings m_i (Kay, *Fundamentals of Statistical Signal
+/// Processing: Estimation Theory*, 1993, section 3.9). `None` if undetermined.
 pub fn patch_limits(sensors: &LoadSensors, loads: &[UniformLoad]) -> Option<Vec<PatchLimit>> {
-    // Force, and the coordinates of the centre.
+    // Force, and coordinates of the centre.
     let each = 1 + sensors.extent.dimensions();
     let alive: Vec<_> = sensors.alive().collect();
     let mut slopes = Array2::zeros((alive.len(), each * loads.len()));
@@ -504,28 +495,26 @@ pub fn patch_limits(sensors: &LoadSensors, loads: &[UniformLoad]) -> Option<Vec<
     Some((0..loads.len()).map(limit).collect())
 }
 
-/// Averaging kernels of the linearised inverse: without the bound at 0, the estimated force of cell i is Σ_k R_ik times the force
-/// of cell k, with R = (AᵀA + λ·P)⁻¹·AᵀA (Backus and Gilbert, *The Resolving Power of Gross Earth Data*, Geophys. J. R. astr.
-/// Soc. 16, 1968). The constraint that no load is negative resolves more than this where adjacent cells have no load.
+/// Averaging kernels of the linearised inverse, R = (AᵀA + λ·P)⁻¹·AᵀA: without the constraint x ≥ 0, cell i
+/// is estimated as Σ_k R_ik·x_k (Backus and Gilbert, *The Resolving Power of Gross Earth Data*, Geophys. J.
+/// R. astr. Soc. 16, 1968).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Resolution {
-    /// The cells.
+    /// Cells.
     pub cells: Cells,
-    /// R, a kernel a row.
+    /// R, by rows.
     pub kernels: Array2<f64>,
-    /// Width of each cell's kernel at half of its height, in metres; on a plane the side of a square as large as the area
-    /// where it is above half of its height.
+    /// Widths at half height in metres; on a plane the root of the area.
     pub widths_m: Vec<f64>,
 }
 
 impl Resolution {
-    /// The median of the kernels' widths, in metres.
+    /// Median width in metres.
     pub fn median_width_m(&self) -> f64 {
         median(self.widths_m.clone()).unwrap_or(0.0)
     }
 }
 
-/// Width of a kernel at half of its height.
 fn width_m(cells: &Cells, kernel: &[f64]) -> f64 {
     let Some(top) = (0..kernel.len()).max_by(|a, b| kernel[*a].total_cmp(&kernel[*b])) else { return 0.0 };
     let half = 0.5 * kernel[top];
@@ -533,7 +522,7 @@ fn width_m(cells: &Cells, kernel: &[f64]) -> f64 {
         let above = kernel.iter().filter(|value| **value > half).count();
         return (above as f64 * cells.measure()).sqrt();
     }
-    // Cells from the top to where the kernel falls to half, interpolated between two cells; the edge is an end too.
+    // Cells from the top to half height, interpolated between two cells; the edge is also an end.
     let reach = |steps: &mut dyn Iterator<Item = usize>| {
         let (mut before, mut reached) = (kernel[top], 0.0);
         for cell in steps {

@@ -1,4 +1,4 @@
-//! The patches of a load: the connected parts of a surface that carry it.
+//! Patches of a load.
 
 use super::bounds::Bounds;
 use super::cells::Cells;
@@ -10,40 +10,40 @@ use palpate_mechanics::surface::{Extent, UniformLoad};
 use palpate_numerics::{holding, hull, normal_interval_95, normal_quantile};
 use serde::Serialize;
 
-/// A patch is where the load is above this share of its highest density.
+/// Density threshold over the highest density.
 pub const PATCH_SHARE: f64 = 0.1;
-/// Cells between a patch and another that it may be part of.
+/// Greatest gap within one patch.
 const REACH_CELLS: usize = 2;
 
-/// Centre of pressure: the mean position of a load.
+/// Centre of pressure.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CentreOfPressure {
-    /// The place.
+    /// Position.
     pub position: Position,
-    /// Standard deviation along x, in metres, by the mixture.
+    /// Standard deviation along x.
     pub sd_x_m: f64,
-    /// Standard deviation along y, in metres; 0 on a line.
+    /// Standard deviation along y.
     pub sd_y_m: f64,
-    /// The ends of the 95 % interval along x, in metres.
+    /// 95 % interval along x.
     pub x_95_m: (f64, f64),
-    /// The ends of the 95 % interval along y, in metres.
+    /// 95 % interval along y.
     pub y_95_m: (f64, f64),
 }
 
-/// A connected part of the surface that carries load.
+/// Connected loaded part.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Patch {
-    /// Left end, or lower left corner: where the load rises above the share of its highest density.
+    /// Left end or lower left corner, at the threshold.
     pub from: Position,
-    /// Right end, or upper right corner.
+    /// Right end or upper right corner.
     pub to: Position,
-    /// Centre of its force.
+    /// Centre of pressure.
     pub centre: CentreOfPressure,
-    /// Force in newtons, its flanks below the share included.
+    /// Force in newtons, with flanks.
     pub force_n: f64,
-    /// Standard deviation of the force, by the mixture.
+    /// Force standard deviation.
     pub force_sd_n: f64,
-    /// The ends of the force's 95 % interval, in newtons; the upper one is infinite where the reading does not bound it.
+    /// 95 % interval of the force, possibly infinite.
     pub force_95_n: (f64, f64),
 }
 
@@ -54,7 +54,7 @@ impl CentreOfPressure {
         Self { position, sd_x_m, sd_y_m, x_95_m, y_95_m }
     }
 
-    /// Takes the intervals of even loads; true where these contain the place.
+    /// Adopts intervals; true if they contain the position.
     pub(super) fn follow(&mut self, even: &EvenLoads, extent: Extent, aim: impl Fn(usize) -> Aim) -> bool {
         self.x_95_m = even.interval_95(aim(0));
         if extent.dimensions() > 1 {
@@ -63,12 +63,10 @@ impl CentreOfPressure {
         self.contains(self.position)
     }
 
-    /// True where the intervals contain a position.
     pub(super) fn contains(&self, position: Position) -> bool {
         holds(self.x_95_m, position.x_m) && holds(self.y_95_m, position.y_m)
     }
 
-    /// Widens the intervals by those of other even loads.
     pub(super) fn widen(
         &mut self,
         even: &EvenLoads,
@@ -83,7 +81,7 @@ impl CentreOfPressure {
         }
     }
 
-    /// Takes the bounds of the mean over some cells of loads of any shape.
+    /// Adopts bounds over some cells.
     pub(super) fn take_bounds(&mut self, bounds: &Bounds, cells: &Cells, listed: &[usize]) {
         let along = |coordinate: fn(Position) -> f64| {
             let at: Vec<f64> = listed.iter().map(|cell| coordinate(cells.centre(*cell))).collect();
@@ -95,7 +93,7 @@ impl CentreOfPressure {
         }
     }
 
-    /// Moves the patch; its intervals are extended where they would not contain the new position.
+    /// Extends the intervals to contain the position.
     pub(super) fn move_to(&mut self, position: Position) {
         self.position = position;
         self.x_95_m = holding(self.x_95_m, position.x_m);
@@ -104,7 +102,7 @@ impl CentreOfPressure {
 }
 
 impl Patch {
-    /// A patch of even loads, which has their standard deviations to first order.
+    /// With first-order standard deviations.
     pub(super) fn of_even_loads(even: &EvenLoads, number: usize, extent: Extent) -> Self {
         let load = even.middle_load(number);
         let sd = |aim| even.sd(aim).unwrap_or(f64::INFINITY);
@@ -120,7 +118,7 @@ impl Patch {
         }
     }
 
-    /// Takes the intervals of an even load, and its place and force where the intervals do not contain those of the patch.
+    /// Adopts intervals, and values that were outside.
     pub(super) fn follow(&mut self, even: &EvenLoads, number: usize, extent: Extent) {
         self.force_95_n = even.interval_95(Aim::Force(number));
         let is_held = self.centre.follow(even, extent, |axis| Aim::Centre(number, axis));
@@ -132,7 +130,7 @@ impl Patch {
         }
     }
 
-    /// Widens the intervals by those of several loads that the patch may be.
+    /// Widens by several candidate loads.
     pub(super) fn widen(&mut self, even: &EvenLoads, numbers: &[usize], extent: Extent) {
         for number in numbers {
             self.force_95_n = hull(self.force_95_n, even.interval_95(Aim::Force(*number)));
@@ -144,14 +142,14 @@ impl Patch {
         }
     }
 
-    /// Distance of a position from the patch, in metres; 0 inside.
+    /// In metres; 0 inside.
     pub(super) fn distance_m(&self, position: Position) -> f64 {
         let beyond = |at_m: f64, from_m: f64, to_m: f64| (from_m - at_m).max(at_m - to_m).max(0.0);
         let along = beyond(position.x_m, self.from.x_m, self.to.x_m);
         along.hypot(beyond(position.y_m, self.from.y_m, self.to.y_m))
     }
 
-    /// An even load with its force and sizes around its centre, no wider than the surface allows: the load of its limit.
+    /// Uniform load of the patch's force and size, within the surface.
     pub fn as_load(&self, extent: Extent) -> UniformLoad {
         let Position { x_m, y_m } = self.centre.position;
         let side = |centre: f64, (from, to): (f64, f64), size: f64| {
@@ -165,18 +163,16 @@ impl Patch {
     }
 }
 
-/// True for a value within an interval.
 pub(super) fn holds((low, high): (f64, f64), value: f64) -> bool {
     (low..=high).contains(&value)
 }
 
-/// The number of the patch nearest to a position; `None` without patches.
 pub(super) fn nearest(patches: &[Patch], position: Position) -> Option<usize> {
     let distance_m = |number: &usize| patches[*number].distance_m(position);
     (0..patches.len()).min_by(|a, b| distance_m(a).total_cmp(&distance_m(b)))
 }
 
-/// The mean position of patches, by their forces.
+/// Weighted by force.
 pub(super) fn mean_position(patches: &[Patch]) -> Position {
     let force_n: f64 = patches.iter().map(|patch| patch.force_n).sum();
     let along = |coordinate: fn(Position) -> f64| {
@@ -185,7 +181,7 @@ pub(super) fn mean_position(patches: &[Patch]) -> Position {
     Position { x_m: along(|p| p.x_m), y_m: along(|p| p.y_m) }
 }
 
-/// The mean position of the force of some cells, with its standard deviation to first order; `None` where they have none.
+/// To first order; `None` without force.
 pub(super) fn centre_of(
     cells: &Cells,
     listed: &[usize],
@@ -206,7 +202,7 @@ pub(super) fn centre_of(
     Some(CentreOfPressure::new(Position { x_m, y_m }, (sd_x_m, sd_y_m)))
 }
 
-/// Standard deviation of Σ slope·force over some cells.
+/// Of Σ slope·force.
 fn sd_of_sum(listed: &[usize], slopes: &[f64], covariance: &Array2<f64>) -> f64 {
     let row = |(i, a): (&usize, &f64)| {
         listed.iter().zip(slopes).map(|(j, b)| a * b * covariance[[*i, *j]]).sum::<f64>()
@@ -214,17 +210,14 @@ fn sd_of_sum(listed: &[usize], slopes: &[f64], covariance: &Array2<f64>) -> f64 
     listed.iter().zip(slopes).map(row).sum::<f64>().max(0.0).sqrt()
 }
 
-/// Cells of a patch: those above the share, and all with its flanks.
+/// Cells above the threshold, and all with flanks.
 struct Part {
     core: Vec<usize>,
     all: Vec<usize>,
 }
 
-/// The patches of a profile, along x.
-///
-/// Connected cells above the share of the highest are patches. Each takes the cells downhill from it as its flanks, up to the
-/// valley to the next. A patch with a force that is not significant against its own uncertainty becomes a part of the one beside it, or,
-/// without a neighbour, is dropped.
+/// Connected cells above the threshold, with flanks down to the minimum between them, along x. An
+/// insignificant patch is merged with the adjacent one, or dropped.
 pub(super) fn find_patches(cells: &Cells, forces_n: &[f64], covariance: &Array2<f64>) -> Vec<Patch> {
     let mut parts = grow(cells, forces_n, cores(cells, forces_n));
     let least_ratio = normal_quantile(1.0 - OUTSIDE_MODEL_RATE);
@@ -249,7 +242,6 @@ pub(super) fn find_patches(cells: &Cells, forces_n: &[f64], covariance: &Array2<
     patches
 }
 
-/// Connected cells above the share of the highest.
 fn cores(cells: &Cells, forces_n: &[f64]) -> Vec<Vec<usize>> {
     let highest = forces_n.iter().fold(0.0, |most: f64, force| most.max(*force));
     let mut open: Vec<bool> = forces_n.iter().map(|force| *force > PATCH_SHARE * highest).collect();
@@ -270,7 +262,7 @@ fn cores(cells: &Cells, forces_n: &[f64]) -> Vec<Vec<usize>> {
     cores
 }
 
-/// Gives each part the cells that lie downhill from it, the highest first.
+/// Assigns downhill cells, the highest first.
 fn grow(cells: &Cells, forces_n: &[f64], cores: Vec<Vec<usize>>) -> Vec<Part> {
     let mut owner = vec![None; cells.len()];
     for (number, core) in cores.iter().enumerate() {
@@ -291,7 +283,7 @@ fn grow(cells: &Cells, forces_n: &[f64], cores: Vec<Vec<usize>>) -> Vec<Part> {
     parts
 }
 
-/// True for two sets of cells with at most [`REACH_CELLS`] cells between them.
+/// At most [`REACH_CELLS`] cells between them.
 fn touches(cells: &Cells, one: &[usize], other: &[usize]) -> bool {
     let place = |cell: usize| (cell % cells.columns, cell / cells.columns);
     one.iter().any(|a| {

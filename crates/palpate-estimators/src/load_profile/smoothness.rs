@@ -1,20 +1,19 @@
-//! Smoothness of a load: every level weighted by its evidence.
+//! Smoothness marginalized by evidence.
 
 use ndarray::{Array1, Array2, Axis};
 use palpate_numerics::Cholesky;
 
-/// Second differences of the forces of cells have standard deviations from 10⁻³ to 10² of a cell's mean force, a quarter of
-/// a decade apart: from a load that is almost a straight line to one with independent cells.
+/// Prior second differences over the mean force: 10⁻³, almost straight, to 10², independent cells.
 const DECADES: (i32, i32) = (-3, 2);
 const LEVELS_A_DECADE: i32 = 4;
-/// Smoothness for the first guess of the force, as a share of the information of the readings.
+/// Initial smoothness over the information.
 const FIRST_SHARE: f64 = 1e-4;
-/// Least share of the probability with which a level counts in the covariance.
+/// Least weight in the covariance.
 const SHARE_THAT_MATTERS: f64 = 1e-4;
 
-/// Least-squares problem of the forces of cells, with its smoothness penalty.
+/// Regularised least squares of cell forces.
 pub(super) struct Problem {
-    /// A: mean influence of each cell (columns) on each live sensor (rows), over the sensor's noise; in 1/N.
+    /// A, enabled sensors × cells, over noise, in 1/N.
     pub influence: Array2<f64>,
     /// AᵀA.
     pub gram: Array2<f64>,
@@ -22,19 +21,18 @@ pub(super) struct Problem {
     pub roughness: Array2<f64>,
 }
 
-/// The forces of cells, over all levels of smoothness.
+/// Mixture over smoothness.
 pub(super) struct Mixture {
-    /// Mean force of each cell, in newtons.
+    /// Mean in newtons.
     pub forces: Array1<f64>,
-    /// Covariance of the forces, in N².
+    /// In N².
     pub covariance: Array2<f64>,
-    /// λ of the most probable level, in 1/N².
+    /// Most probable λ, in 1/N².
     pub smoothness: f64,
-    /// The least ‖A·x − y‖² of all levels.
+    /// Least ‖A·x − y‖².
     pub least_misfit: f64,
 }
 
-/// One smoothness λ.
 struct Level {
     smoothness: f64,
     log_evidence: f64,
@@ -47,7 +45,7 @@ impl Problem {
         Self { gram: influence.t().dot(&influence), influence, roughness }
     }
 
-    /// The forces for a whitened reading y; `None` where no load at all explains it best.
+    /// `None` if no load explains y best.
     pub fn solve(&self, y: &Array1<f64>) -> Option<Mixture> {
         let levels = self.levels(y)?;
         let best = levels.iter().max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
@@ -60,7 +58,7 @@ impl Problem {
         Some(Mixture { forces, covariance, smoothness: best.smoothness, least_misfit })
     }
 
-    /// All levels, from the smoothest down.
+    /// Smoothest first.
     fn levels(&self, y: &Array1<f64>) -> Option<Vec<Level>> {
         let cells = self.gram.nrows();
         let g = self.influence.t().dot(y);
@@ -90,8 +88,8 @@ impl Problem {
         &self.gram + &(smoothness * &self.roughness)
     }
 
-    /// Evidence of a level: ln of ∫ exp(−½·‖A·x − y‖² − ½·λ·xᵀP·x − μ·Σx) dx over the free cells, by Laplace's method, less the logarithm of the
-    /// integral without readings. The part of μ is equal for all levels and omitted.
+    /// Laplace approximation of ln ∫ exp(−½·‖A·x − y‖² − ½·λ·xᵀP·x − μ·Σx) dx over the free cells, minus that
+    /// without readings and a constant of μ.
     fn level(&self, y: &Array1<f64>, smoothness: f64, rate: f64, minimum: NonNegative) -> Option<Level> {
         let x = &minimum.solution;
         let force = x.sum();
@@ -108,7 +106,7 @@ impl Problem {
         Some(Level { smoothness, log_evidence, misfit, minimum })
     }
 
-    /// Mean and covariance over the levels: Σ w·x, and Σ w·(H⁻¹ + (x − mean)·(x − mean)ᵀ).
+    /// Σ w·x and Σ w·(H⁻¹ + (x − mean)·(x − mean)ᵀ).
     fn mixture(&self, weighed: &[(f64, &Level)]) -> (Array1<f64>, Array2<f64>) {
         let cells = self.gram.nrows();
         let forces = weighed.iter().fold(Array1::zeros(cells), |mut sum: Array1<f64>, (weight, level)| {
@@ -133,30 +131,29 @@ impl Problem {
     }
 }
 
-/// Exchanges of the whole set that may pass without progress before indices are exchanged one by one.
+/// Block exchanges without progress.
 const PATIENCE: usize = 3;
-/// Exchanges after which the search is given up, for each unknown; a handful is usual in all.
+/// Exchanges per unknown; a handful is usual.
 const MOST_EXCHANGES: usize = 20;
-/// A gradient above minus this share of the largest entry of g is rounding.
+/// Relative gradient rounding.
 const ROUNDING: f64 = 1e-11;
 
 /// Minimum of ½·xᵀH·x − gᵀx over x ≥ 0.
 #[derive(Clone, Debug)]
 pub(super) struct NonNegative {
-    /// x.
     pub solution: Array1<f64>,
-    /// The unknowns above 0, in rising order.
+    /// Ascending.
     pub free: Vec<usize>,
-    /// The Cholesky factor of H on them.
+    /// Of H on the free unknowns.
     pub factor: Cholesky,
 }
 
-/// Minimises ½·xᵀH·x − gᵀx over x ≥ 0 for a positive definite H, beginning with `start` as the free unknowns; `None` where H
-/// is not positive definite to rounding, or the search does not end.
+/// Minimises ½·xᵀH·x − gᵀx over x ≥ 0 from the free unknowns `start`; `None` without convergence, or if H is
+/// not positive definite.
 ///
-/// Block principal pivoting: all unknowns that are on the wrong side change sides at once; when that makes no progress, the
-/// last of them alone, which is certain to end (Júdice and Pires, Computers & Operations Research 21, 1994; Kim and Park,
-/// SIAM J. Sci. Comput. 33, 2011).
+/// Block principal pivoting: all infeasible unknowns change sides, or without progress the last alone, which
+/// terminates (Júdice and Pires, Computers & Operations Research 21, 1994; Kim and Park, SIAM J. Sci. Comput.
+/// 33, 2011).
 pub(super) fn minimise(hessian: &Array2<f64>, g: &Array1<f64>, start: &[usize]) -> Option<NonNegative> {
     let n = g.len();
     let tolerance = ROUNDING * g.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
@@ -184,7 +181,6 @@ pub(super) fn minimise(hessian: &Array2<f64>, g: &Array1<f64>, start: &[usize]) 
     None
 }
 
-/// The minimum over the free unknowns, the others being 0.
 fn solve_free(hessian: &Array2<f64>, g: &Array1<f64>, is_free: &[bool]) -> Option<NonNegative> {
     let free: Vec<usize> = (0..g.len()).filter(|i| is_free[*i]).collect();
     let factor = Cholesky::factor(block(hessian, &free)).ok()?;
@@ -194,7 +190,6 @@ fn solve_free(hessian: &Array2<f64>, g: &Array1<f64>, is_free: &[bool]) -> Optio
     Some(NonNegative { solution, free, factor })
 }
 
-/// The rows and columns of a matrix that are listed.
 pub(super) fn block(matrix: &Array2<f64>, listed: &[usize]) -> Array2<f64> {
     matrix.select(Axis(0), listed).select(Axis(1), listed)
 }
@@ -207,7 +202,7 @@ mod tests {
     use rand_xoshiro::Xoshiro256PlusPlus;
 
     proptest! {
-        /// Karush, Kuhn and Tucker: x ≥ 0, gradient ≥ 0, and one of them 0.
+        /// Karush–Kuhn–Tucker conditions.
         #[test]
         fn the_minimum_meets_its_conditions(seed in 0u64..1000, n in 1usize..40) {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);

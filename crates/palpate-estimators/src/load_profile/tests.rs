@@ -1,4 +1,4 @@
-//! Profiles of known loads, over many readings.
+//! Profiles of known loads over many readings.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ pub(super) fn beam() -> Beam {
     Beam::new(0.4, 0.04, 1.2e-3, 200e9).unwrap()
 }
 
-/// Eight deflection sensors with 2 µm noise, and eight strain sensors with 0.5 µε if `strain`.
+/// Eight deflection sensors with 2 µm noise, and with `strain` eight strain sensors with 0.5 µε.
 pub(super) fn layout(strain: bool) -> Layout {
     let mut layout = Layout::even(SensorKind::Deflection, 8, 0.4);
     layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 2e-6)).unwrap();
@@ -101,13 +101,13 @@ fn two_patches_are_told_at_their_limits() {
     const READINGS: usize = 24;
     let tally = tally(true, READINGS);
     assert!(tally.worst_force_percent < 2.0 && tally.two + 1 >= READINGS, "{tally:?}");
-    // One of 200 readings of the experiment is farther off, so that two of 24 are one sample in 150.
+    // One of 200 readings of the experiment deviates more, so two of 24 occur in one of 150 samples.
     assert!(tally.within_3_limits + 1 >= READINGS, "{tally:?}");
-    // Of 48 centres the root mean square is 0.89 ± 0.1 limits in the experiment.
+    // The root mean square of 48 centres is 0.89 ± 0.1 limits in the experiment.
     assert!(tally.centre_squares < 1.3 * 1.3 * 2.0 * tally.two as f64, "{tally:?}");
-    // A third load is significant at 5 % in one of twenty readings: in six of 24 in one sample of a thousand.
+    // A third load is significant at 5 % in one of twenty readings: in six of 24 with probability 0.001.
     assert!(tally.resolved + 5 >= READINGS, "{tally:?}");
-    // Of 24 intervals that cover 95 %, fewer than 19 cover in one sample of a thousand, and of 48 fewer than 40.
+    // With a coverage of 95 %, fewer than 19 of 24 or 40 of 48 intervals cover with probability 0.001.
     assert!(tally.centres_covered.min(tally.forces_covered) >= 40, "{tally:?}");
     assert!(tally.total_covered.min(tally.pressure_covered) >= 19, "{tally:?}");
 }
@@ -117,7 +117,7 @@ fn two_patches_are_told_at_their_limits() {
 fn deflections_alone_tell_less() {
     const READINGS: usize = 24;
     let tally = tally(false, READINGS);
-    // Of 24 readings, fewer than 19 have two patches in one sample of a thousand.
+    // Fewer than 19 of 24 readings have two patches with probability 0.001.
     assert!(tally.worst_force_percent < 5.0 && tally.two.min(tally.within_3_limits) >= 19, "{tally:?}");
 }
 
@@ -150,10 +150,10 @@ fn an_even_load_is_smooth_and_one_patch() {
     let load = UniformLoad::along(0.02, 0.38, 4.0);
     let reading = noisy(&sensors, &clean(&sensors, &[load]), &mut Xoshiro256PlusPlus::seed_from_u64(3));
     let profile = Profiler::new(sensors).profile(&reading).unwrap();
-    // A second load is significant at 5 % in this reading, though not at one in a thousand.
+    // A second load is significant at 5 % in this reading, but not at 0.1 %.
     assert_eq!((profile.status, profile.patches.len()), (Status::Ambiguous, 1));
     assert!((profile.total_n - 4.0).abs() < 0.2, "{}", profile.total_n);
-    // Half of its length, from 100 mm to 300 mm: the sums are determined better than the shape.
+    // Half of the length, from 100 mm to 300 mm: sums are determined better than the shape.
     let middle: f64 = profile.forces_n[20..60].iter().sum();
     assert!((middle / (4.0 * 0.2 / 0.36) - 1.0).abs() < 0.05, "{middle}");
 }
@@ -169,10 +169,10 @@ fn silence_and_impossible_readings_have_their_status() {
     assert_eq!((silent.status, silent.total_n, silent.patches.len()), (Status::NoContact, 0.0, 0));
     assert!(profiler.resolution(&silent).is_none() && silent.centre.is_none());
     let mut reading = clean(&sensors, &[patch(0.14, 2.0)]);
-    // A dead channel has no effect, for any reading.
+    // A disabled channel has no effect.
     reading[3] = 1.0;
     assert_eq!(profiler.profile(&reading).unwrap().status, Status::Located);
-    // One deflection sensor a tenth of a millimetre off, which no load explains.
+    // A deflection sensor with an error of 0.1 mm, which no load explains.
     reading[5] += 1e-4;
     assert_eq!(profiler.profile(&reading).unwrap().status, Status::OutsideModel);
     // A load that pulls.
@@ -216,10 +216,10 @@ fn the_resolution_is_finer_with_strain() {
     assert!(with < 0.8 * without, "{with} {without}");
 }
 
-/// A sheet of foam: a force dents it around itself.
+/// A sheet of foam: a force dents it locally.
 pub(super) struct Foam;
 
-/// The dent's standard deviation, in metres, and its depth, in m/N.
+/// Standard deviation of the dent in metres, and depth in m/N.
 const DENT_M: f64 = 0.03;
 const DEPTH_M_PER_N: f64 = 1e-3;
 
@@ -291,8 +291,8 @@ fn on_a_plane_two_squares_are_told_apart() {
     }
 }
 
-/// Loads of one or two pads of 20 mm by the distance of the outermost pad's centre from a support: how often the total's interval contains the total,
-/// with and without the load within the margin.
+/// Coverage of the total by the distance of the outermost pad's centre from a support, with and without load
+/// within the margin, for one or two pads of 20 mm.
 fn covered_by_distance(readings: usize) -> Vec<[f64; 3]> {
     let beam = beam();
     let mut layout = layout(false);
@@ -333,14 +333,15 @@ const DISTANCES_M: [(f64, f64); 3] = [(0.01, 0.015), (0.02, 0.04), (0.1, 0.2)];
 fn totals_are_held_wherever_the_load_lies() {
     const READINGS: usize = 20;
     for ((from_m, _), [held, seen, seen_held]) in DISTANCES_M.into_iter().zip(covered_by_distance(READINGS)) {
-        // Of 20 intervals that cover 95 %, fewer than 16 cover in three samples of a thousand.
+        // With a coverage of 95 %, fewer than 16 of 20 intervals cover with probability 0.003.
         assert!(held >= 0.8 && (seen < 0.5 || seen_held >= 0.75), "{from_m}: {held} {seen} {seen_held}");
     }
 }
 
 #[test]
 fn a_load_next_to_a_support_is_not_told_as_a_lighter_one() {
-    // Two loads of 2 N, one of them 5 to 25 mm from the support: the profile has the one at 45 mm, and 2.7 N in all.
+    // Two loads of 2 N, one at 5 to 25 mm from the support: the profile places it at 45 mm, with a total of
+    // 2.7 N.
     let beam = beam();
     let sensors = LoadSensors::new(&beam, &layout(false)).unwrap();
     let loads = [patch(0.015, 2.0), patch(0.21, 2.0)];
@@ -357,7 +358,8 @@ fn a_load_next_to_a_support_is_not_told_as_a_lighter_one() {
     assert!(low < 4.0 && 4.0 < high, "{low} to {high}");
 }
 
-/// The smooth profile shows 20 N on 370–390 mm alone, because 2 N on 100–160 mm are less than a tenth of its density.
+/// The smooth profile shows only 20 N on 370–390 mm, because 2 N on 100–160 mm have less than a tenth of its
+/// density.
 #[test]
 fn finds_a_light_patch_that_a_dense_one_hides_from_the_profile() {
     let beam = beam();
@@ -386,14 +388,14 @@ fn finds_a_light_patch_that_a_dense_one_hides_from_the_profile() {
     assert!(covered >= 10, "{covered} of 12");
 }
 
-/// Where even loads do not explain the reading, intervals are those of loads of any shape, and contain the truth.
+/// If no uniform loads explain the reading, intervals are those of any shape, and contain the truth.
 #[test]
 fn uneven_loads_have_the_intervals_of_any_shape() {
     let beam = beam();
     let mut layout = layout(true);
     layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd *= 0.01)).unwrap();
     let sensors = LoadSensors::new(&beam, &layout).unwrap();
-    // A wedge: density in proportion to the distance from its left end.
+    // A wedge: density proportional to the distance from its left end.
     let wedge: Vec<UniformLoad> = (0..12)
         .map(|i| UniformLoad::along(0.14 + 0.01 * f64::from(i), 0.15 + 0.01 * f64::from(i), f64::from(i + 1)))
         .collect();

@@ -1,4 +1,4 @@
-//! The k nearest neighbours: the contact is estimated from the training presses with the most similar readings.
+//! k-nearest-neighbours estimator.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,8 +14,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// The k nearest neighbours, weighted by their inverse distance, in the space of the reading's [`Features`], each scaled
-/// to variance 1. Whitening by their full covariance would amplify directions of pure noise to the size of the others.
+/// k nearest neighbours weighted by inverse distance, over [`Features`]; whitening would amplify noise.
 ///
 /// ```
 /// use palpate_estimators::{arrangement::Training, fit::Fit, setup::Setup, neighbours::Neighbours};
@@ -30,8 +29,7 @@ use palpate_numerics::watch::{Cancelled, Watch};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Neighbours {
-    /// Most neighbours to try, at least 1. Each training row is located by the rows at other positions; the number k = 1, 2, … with the least
-    /// root-mean-square error is chosen, and among several kinds of features the one with the least error.
+    /// Upper limit of k, at least 1; k and features minimize held-out error.
     pub most: usize,
 }
 
@@ -41,19 +39,19 @@ impl Default for Neighbours {
     }
 }
 
-/// A recording that the neighbours do not suit.
+/// Recording that neighbours do not suit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NeighboursFitError {
-    /// Too few positions: each needs another one to be located by.
+    /// Too few positions.
     #[error(transparent)]
     Positions(#[from] TooFewPositions),
-    /// Constant readings, which cannot be compared.
+    /// Constant readings.
     #[error(transparent)]
     Features(#[from] NoFeatures),
-    /// The recording's channels are not the setup's.
+    /// Channel mismatch.
     #[error(transparent)]
     Channels(#[from] ChannelMismatch),
-    /// The fit was stopped.
+    /// Cancelled.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
@@ -79,7 +77,6 @@ impl Fit for Neighbours {
 }
 
 impl Neighbours {
-    /// The locator by features of one kind, and the sum of its squared errors at held-out positions, in m².
     fn with_features(
         &self,
         kind: FeatureKind,
@@ -106,11 +103,8 @@ impl Neighbours {
     }
 }
 
-/// Most rows that are held out: so many errors suffice to choose the number of neighbours and to estimate the error.
 pub(crate) const MOST_HELD_OUT: usize = 4000;
 
-/// Errors (x, y) in metres of every row, or of evenly picked ones, by 1, 2, … neighbours at other positions, up to `most` or as many
-/// as every row has.
 fn held_out_errors(rows: &[Neighbour], most: usize, watch: Watch) -> Result<Vec<Vec<[f64; 2]>>, Cancelled> {
     let mut errors: Vec<Vec<[f64; 2]>> = Vec::new();
     let picked = thinned(rows.len(), MOST_HELD_OUT);
@@ -128,31 +122,31 @@ fn held_out_errors(rows: &[Neighbour], most: usize, watch: Watch) -> Result<Vec<
     Ok(errors)
 }
 
-/// Neighbours that locate; see [`Neighbours`].
+/// Fitted [`Neighbours`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NeighboursLocator {
-    /// The surface.
+    /// Surface.
     pub extent: Extent,
-    /// Features by which readings are compared.
+    /// Features.
     pub features: Features,
-    /// k, the number of neighbours.
+    /// Number k of neighbours.
     pub count: usize,
-    /// The training rows.
+    /// Training rows.
     pub rows: Vec<Neighbour>,
-    /// The contact's force in newtons, where it is known.
+    /// Known force.
     pub force_n: Option<f64>,
-    /// Errors of the neighbours at other positions.
+    /// Held-out errors.
     pub spread: Option<HeldOutErrors>,
 }
 
-/// A training row.
+/// Training row.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Neighbour {
-    /// Reading's features.
+    /// Features.
     pub features: Vec<f64>,
-    /// Contact.
+    /// Position of the contact.
     pub position: Position,
 }
 
@@ -186,7 +180,7 @@ impl Locate for NeighboursLocator {
     }
 }
 
-/// The `most` nearest of `rows` to `place`, nearest first, with their squared distances. Ties go to the earlier row.
+/// Ties go to the earlier row.
 fn nearest<'a>(
     rows: impl Iterator<Item = &'a Neighbour>,
     place: &[f64],
@@ -207,7 +201,7 @@ fn nearest<'a>(
     found
 }
 
-/// Σ p_i/d_i / Σ 1/d_i over the nearest 1, 2, … of `found`: one position a count. Rows at distance 0 outweigh all others.
+/// Σ p_i/d_i / Σ 1/d_i; distance 0 outweighs all others.
 fn means(found: &[(f64, &Neighbour)]) -> Vec<Position> {
     let exact = found.iter().take_while(|(squared, _)| *squared == 0.0).count();
     let (mut x, mut y, mut total) = (0.0, 0.0, 0.0);

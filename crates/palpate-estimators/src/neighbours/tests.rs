@@ -1,5 +1,3 @@
-//! Neighbours on surfaces with readings that are the position itself.
-
 use super::*;
 use crate::fit::{Fit, FitTask, Locate};
 use crate::recording::{Recording, Row};
@@ -80,7 +78,7 @@ fn at_unknown_force_only_the_direction_and_the_size_count() {
 
 #[test]
 fn repeats_do_not_vouch_for_their_own_position() {
-    // Ten repeats a position: were a row judged by its repeats, one neighbour would look perfect.
+    // Ten repeats per position: compared with its repeats, a row would favour one neighbour.
     let rows: Vec<Row> = (0..10).flat_map(|i| vec![row(0.01 * f64::from(i), 0.0, 1.0); 10]).collect();
     let locator = fit(&setup(Some(1.0)), rows).unwrap();
     assert!(locator.count > 10, "{}", locator.count);

@@ -1,14 +1,13 @@
-//! The activation functions, in every lane at once.
+//! Vectorized activation functions.
 
 use super::Activation;
 use palpate_numerics::simd::{Real, Vector};
 use std::f64::consts::LOG2_E;
 
-/// Values that are computed together: enough independent multiply-adds to keep two units busy over the latency of one, and the founding paper's ten
-/// hidden nodes at once.
+/// Multiply-adds for two units, and the paper's ten hidden nodes.
 const BLOCK: usize = 10;
 
-/// 1 + exp(−z) of B values in step, by 2^x = 2^n · 2^r with n the whole number next to x and a polynomial in r.
+/// 1 + exp(−z) by 2^n · 2^r with a polynomial in r.
 #[inline(always)]
 fn denominators<V: Vector<N>, const N: usize, const B: usize>(z: [V; B]) -> [V; B] {
     let number = |x: f64| V::splat(V::Real::from_f64(x));
@@ -32,8 +31,7 @@ fn denominators<V: Vector<N>, const N: usize, const B: usize>(z: [V; B]) -> [V; 
     power
 }
 
-/// σ(z) = 1 / (1 + exp(−z)) of B values, each two by one division: 1/a = b/(a·b). The divider is the slowest unit
-/// that activation needs, so halving its work pays for the multiplications.
+/// 1 / (1 + exp(−z)), two values per division: 1/a = b/(a·b).
 #[inline(always)]
 fn logistic_block<V: Vector<N>, const N: usize, const B: usize>(values: &mut [V; B]) {
     let one = V::splat(V::Real::from_f64(1.0));
@@ -48,7 +46,6 @@ fn logistic_block<V: Vector<N>, const N: usize, const B: usize>(values: &mut [V;
     }
 }
 
-/// Replaces a layer's weighted sums by its outputs.
 #[inline(always)]
 pub(crate) fn activate<V: Vector<N>, const N: usize>(activation: Activation, values: &mut [V]) {
     let (blocks, rest) = values.as_chunks_mut::<BLOCK>();
@@ -64,7 +61,6 @@ pub(crate) fn activate<V: Vector<N>, const N: usize>(activation: Activation, val
     }
 }
 
-/// [`activate`] for B sums, in step.
 #[inline(always)]
 fn activate_block<V: Vector<N>, const N: usize, const B: usize>(activation: Activation, values: &mut [V; B]) {
     let one = V::splat(V::Real::from_f64(1.0));
@@ -84,7 +80,6 @@ fn activate_block<V: Vector<N>, const N: usize, const B: usize>(activation: Acti
     }
 }
 
-/// The derivative of the activation, from its output.
 #[inline(always)]
 pub(crate) fn derivative<V: Vector<N>, const N: usize>(activation: Activation, output: V) -> V {
     let one = V::splat(V::Real::from_f64(1.0));
@@ -100,7 +95,6 @@ mod tests {
     use super::*;
     use palpate_numerics::simd::{Arithmetic, Array};
 
-    /// σ by the library's exponential.
     fn exact(z: f64) -> f64 {
         1.0 / (1.0 + (-z).exp())
     }

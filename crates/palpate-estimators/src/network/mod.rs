@@ -1,12 +1,11 @@
-//! Feed-forward networks: the founding paper's, trained by back-propagation, and ensembles trained by Levenberg–Marquardt.
+//! Feed-forward networks by back-propagation (founding paper) or Levenberg–Marquardt.
 //!
-//! There are four forward passes, each where another would be slower or could not run:
+//! Forward passes:
 //!
-//! - [`palpate_core::Network`], row by row, needs only its scratch memory: it runs on a chip, and the others are tested against it.
-//! - [`PreparedNetwork`] locates. It takes a third of the time, as its weights lie in columns; a chip does not have the memory for these. (The same
-//!   rows with AVX2 and FMA take two and a half times as long.)
-//! - [`train_many`] and [`train_one`] train: weights of several networks lie side by side, and the pass over the first layer includes its update.
-//! - [`LevenbergMarquardt`] keeps the outputs of every layer, which derivatives by the weights need and the faster passes do not keep.
+//! - [`palpate_core::Network`]: the reference, for chips.
+//! - [`PreparedNetwork`]: location, with weights in columns.
+//! - [`train_many`] and [`train_one`]: training side by side, with a fused first layer.
+//! - [`LevenbergMarquardt`]: keeps the outputs of every layer.
 
 mod levenberg_marquardt;
 mod logistic;
@@ -33,8 +32,8 @@ use palpate_numerics::mean_and_variance;
 use palpate_numerics::simd::InstructionSet;
 use palpate_numerics::watch::Cancelled;
 
-/// A feed-forward network and how it is trained. The default is the founding paper's: one hidden layer of ten
-/// logistic nodes, a logistic output, and back-propagation with learning rate 0.7 and momentum 0.9.
+/// Feed-forward network, by default the founding paper's: ten logistic hidden nodes, learning rate 0.7,
+/// momentum 0.9.
 ///
 /// ```
 /// use palpate_estimators::{arrangement::Training, fit::Fit, setup::Setup, network::Network};
@@ -53,19 +52,19 @@ use palpate_numerics::watch::Cancelled;
 pub struct Network {
     /// Nodes of each hidden layer, input side first.
     pub hidden: Vec<usize>,
-    /// Activation of every hidden layer.
+    /// Activation of the hidden layers.
     pub hidden_activation: Activation,
     /// Activation of the output layer.
     pub output_activation: Activation,
-    /// Whether every node has a bias.
+    /// True for nodes with biases.
     pub biases: bool,
     /// Coding of the output.
     pub output: OutputCoding,
-    /// Scaling of readings into inputs.
+    /// Scaling of inputs.
     pub input_scale: InputScale,
     /// Training rule.
     pub training: BackPropagation,
-    /// The arithmetic of training; estimates are always made in 64 bits.
+    /// Precision of training; estimates are in 64 bits.
     pub precision: Precision,
 }
 
@@ -94,30 +93,29 @@ pub enum OutputCoding {
     Normalized,
 }
 
-/// Scaling of readings into network inputs. The paper does not give it; the choice decides how fast and how well the network trains.
+/// Scaling of readings; not given in the paper.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InputScale {
-    /// Each sensor kind divided by the largest reading that the contact force can cause anywhere on the surface; for
-    /// a surface without a model, by the largest magnitude in the training recording.
+    /// Largest reading of each kind under the contact force; without a model, in the recording.
     FullScale,
-    /// Each channel shifted to mean 0 and divided by its standard deviation over the training recording.
+    /// Mean 0 and standard deviation 1 over the recording.
     Standardized,
-    /// Every channel divided by this reading, in the SI unit of the sensors (m, rad, 1, N) or raw.
+    /// Division by a fixed reading, SI or raw.
     DivideBy(f64),
 }
 
-/// Back-propagation with momentum, one weight update a pattern (Rumelhart, Hinton and Williams 1986).
+/// Back-propagation with momentum, one update per pattern (Rumelhart, Hinton and Williams 1986).
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct BackPropagation {
-    /// η, the step along the gradient; greater than 0.
+    /// Learning rate η; greater than 0.
     pub learning_rate: f64,
-    /// α, the share of the previous step that is repeated; 0 ≤ α < 1.
+    /// Momentum α; 0 ≤ α < 1.
     pub momentum: f64,
-    /// Training converges when the sum of squared output errors over one epoch is at most this.
+    /// Converged sum of squared output errors.
     pub aggregate_error: f64,
-    /// Training is capped after this many epochs; see [`BackPropagation::most_epochs`].
+    /// Cap of epochs; see [`BackPropagation::most_epochs`].
     pub max_epochs: u32,
-    /// Order in which the patterns are presented.
+    /// Order of patterns.
     pub order: PresentationOrder,
     /// Weights start uniform within ± this.
     pub initial_weights: f64,
@@ -137,8 +135,7 @@ impl Default for BackPropagation {
 }
 
 impl BackPropagation {
-    /// Epochs after which training on so many patterns is capped: `max_epochs`, and with more than 65,536 patterns at most 200 million presentations,
-    /// which take a minute.
+    /// Returns `max_epochs`, and for more than 65,536 patterns at most 200 million presentations.
     pub fn most_epochs(&self, patterns: usize) -> u32 {
         const FEW_PATTERNS: usize = 1 << 16;
         const MOST_PRESENTATIONS: usize = 200_000_000;
@@ -149,7 +146,7 @@ impl BackPropagation {
     }
 }
 
-/// The order in which an epoch presents the patterns.
+/// Order of patterns in an epoch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PresentationOrder {
@@ -159,15 +156,14 @@ pub enum PresentationOrder {
     Fixed,
 }
 
-/// Layer sizes, activations and biases of a fully connected feed-forward network.
+/// Topology of a fully connected network.
 ///
-/// Weights are one flat list: layer by layer, node by node. A node's row has one weight an input and, with biases,
-/// the bias last, as the weight of an input that is always 1.
+/// Weights are a flat list by layer and node, each node's bias last.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Topology {
-    /// Nodes of every layer, inputs first and outputs last: `[8, 10, 1]` is the founding paper's.
+    /// Nodes of every layer, inputs first.
     pub sizes: Vec<usize>,
-    /// Whether every node has a bias.
+    /// True for nodes with biases.
     pub biases: bool,
     /// Activation of the hidden layers.
     pub hidden_activation: Activation,
@@ -176,7 +172,7 @@ pub struct Topology {
 }
 
 impl Topology {
-    /// The topology of `config` with `inputs` readings and `outputs` coordinates.
+    /// Returns the topology of `config`.
     pub fn new(config: &Network, inputs: usize, outputs: usize) -> Self {
         let sizes = std::iter::once(inputs).chain(config.hidden.iter().copied()).chain([outputs]).collect();
         Self {
@@ -197,22 +193,22 @@ impl Topology {
         self.sizes.last().copied().unwrap_or(0)
     }
 
-    /// Number of layers with weights.
+    /// Number of weighted layers.
     pub fn layers(&self) -> usize {
         self.sizes.len().saturating_sub(1)
     }
 
-    /// Weights of one node of weighted layer `layer` (0 is the first hidden one), its bias included.
+    /// Returns the weights per node of a layer, bias included.
     pub fn row_len(&self, layer: usize) -> usize {
         self.sizes[layer] + usize::from(self.biases)
     }
 
-    /// Nodes of weighted layer `layer`.
+    /// Returns the nodes of weighted layer `layer`.
     pub fn rows(&self, layer: usize) -> usize {
         self.sizes[layer + 1]
     }
 
-    /// Activation of weighted layer `layer`.
+    /// Returns the activation of a weighted layer.
     pub fn activation(&self, layer: usize) -> Activation {
         if layer + 1 == self.layers() { self.output_activation } else { self.hidden_activation }
     }
@@ -222,14 +218,13 @@ impl Topology {
         (0..self.layers()).map(|layer| self.rows(layer) * self.row_len(layer)).sum()
     }
 
-    /// Number of weights, biases included, of a shape from a file; `None` where it overflows.
     pub(crate) fn checked_weight_count(&self) -> Option<usize> {
         self.sizes.windows(2).try_fold(0usize, |sum, pair| {
             pair[1].checked_mul(pair[0].checked_add(usize::from(self.biases))?)?.checked_add(sum)
         })
     }
 
-    /// The network of this shape with these weights, as it runs on a chip.
+    /// Returns the network for chips.
     pub fn network<'a>(&'a self, weights: &'a [f64]) -> palpate_core::Network<'a> {
         palpate_core::Network {
             sizes: &self.sizes,
@@ -241,21 +236,21 @@ impl Topology {
     }
 }
 
-/// Training patterns, already scaled and coded.
+/// Scaled training patterns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainingSet {
-    /// Inputs of a pattern.
+    /// Inputs per pattern.
     pub inputs: usize,
-    /// Outputs of a pattern.
+    /// Outputs per pattern.
     pub outputs: usize,
-    /// Inputs, pattern by pattern.
+    /// Inputs by pattern.
     pub input_values: Vec<f64>,
-    /// Targets, pattern by pattern.
+    /// Targets by pattern.
     pub target_values: Vec<f64>,
 }
 
 impl TrainingSet {
-    /// The largest number of patterns: up to here 32 random bits pick all patterns equally often to within 0.4 %.
+    /// Limit of patterns, picked by 32 random bits equally often to 0.4 %.
     pub const MOST: usize = 1 << 24;
 
     /// Number of patterns.
@@ -264,36 +259,36 @@ impl TrainingSet {
     }
 }
 
-/// A recording that a network cannot be fitted to.
+/// Recording that a network does not suit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NetworkFitError {
-    /// Too many rows for the presentation order.
+    /// Too many rows.
     #[error("the recording has {found} rows; a network is trained on at most {most}")]
     TooManyRows {
         /// Rows.
         found: usize,
-        /// Bound.
+        /// Limit.
         most: usize,
     },
-    /// A recording without rows.
+    /// No rows.
     #[error("the recording has no rows; a network needs at least 1")]
     NoRows,
-    /// A channel with readings that cannot be scaled.
+    /// Channel that cannot be scaled.
     #[error(
         "channel `{channel}` cannot be scaled: its {what} is {value}; it must be a number greater than 0"
     )]
     Unscalable {
-        /// The channel's name.
+        /// Channel name.
         channel: String,
-        /// Name of its divisor.
+        /// Name of the divisor.
         what: &'static str,
         /// Value.
         value: f64,
     },
-    /// The recording's channels are not the setup's.
+    /// Channel mismatch.
     #[error(transparent)]
     Channels(#[from] ChannelMismatch),
-    /// The fit was stopped.
+    /// Cancelled.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
@@ -308,7 +303,6 @@ impl Fit for Network {
         Ok(coded.locator(network))
     }
 
-    /// Trains as many networks side by side as there are lanes.
     fn fit_many(
         &self,
         task: FitTask,
@@ -323,10 +317,10 @@ impl Fit for Network {
 }
 
 impl Network {
-    /// The locator of an earlier fit, from its weights and outcome; `None` for another number of weights than the network's.
+    /// Restores the locator of an earlier fit; `None` for the wrong number of weights.
     ///
     /// # Errors
-    /// [`NetworkFitError`] when the recording cannot be coded.
+    /// [`NetworkFitError`] for an unsuitable recording.
     pub fn restore(
         &self,
         task: FitTask,
@@ -343,7 +337,6 @@ impl Network {
     }
 }
 
-/// A recording coded into training patterns, with the scales of readings and positions.
 struct Coded<'a> {
     topology: Topology,
     patterns: TrainingSet,
@@ -421,15 +414,15 @@ fn channel_scaling(
     (0..recording.channels.len()).map(one).collect()
 }
 
-/// Status of a training that has ended.
+/// Status of a completed training.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TrainingStatus {
-    /// The aggregate error fell to the tolerance.
+    /// Aggregate error within the tolerance.
     Converged,
-    /// The epoch cap came first.
+    /// Epoch cap.
     Capped,
-    /// A weight is not finite any more.
+    /// Infinite weight.
     Diverged,
 }
 
@@ -443,26 +436,24 @@ impl std::fmt::Display for TrainingStatus {
     }
 }
 
-/// Outcome of a training. A training that does not converge has a status, not an error.
+/// Outcome of a training.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TrainingOutcome {
     /// Status.
     pub status: TrainingStatus,
-    /// Passes over all patterns.
+    /// Number of epochs.
     pub epochs: u32,
-    /// Sum of squared output errors over the last epoch.
+    /// Sum of squared output errors.
     pub aggregate_error: f64,
 }
 
 impl Default for TrainingOutcome {
-    /// Outcome of a method without training by epochs: converged before the first.
     fn default() -> Self {
         Self { status: TrainingStatus::Converged, epochs: 0, aggregate_error: 0.0 }
     }
 }
 
 impl TrainingOutcome {
-    /// The outcome after an epoch; `None` while training continues.
     fn after_epoch(epochs: u32, error: f64, task: &TrainingTask) -> Option<Self> {
         let status = if !error.is_finite() {
             TrainingStatus::Diverged
@@ -477,58 +468,58 @@ impl TrainingOutcome {
     }
 }
 
-/// A network's weights, and the outcome of their training.
+/// Trained network.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainedNetwork {
-    /// Shape.
+    /// Topology.
     pub topology: Topology,
-    /// Weights, in the order that [`Topology`] states.
+    /// Weights in the order of [`Topology`].
     pub weights: Vec<f64>,
-    /// Outcome of its training.
+    /// Outcome of the training.
     pub outcome: TrainingOutcome,
 }
 
-/// Scaling of a channel's reading r into an input: (r − offset) / divisor.
+/// Scaling (r − offset) / divisor.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelScaling {
-    /// In the channel's SI unit, or raw.
+    /// Offset, SI or raw.
     pub offset: f64,
-    /// In the channel's SI unit, or raw; greater than 0.
+    /// Divisor, SI or raw; greater than 0.
     pub divisor: f64,
 }
 
 impl ChannelScaling {
-    /// The input for a reading.
+    /// Returns the input for a reading.
     pub fn apply(self, reading: f64) -> f64 {
         (reading - self.offset) / self.divisor
     }
 }
 
-/// Parts of a trained network, as in a locator file.
+/// Trained network in a locator file.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NetworkParts {
-    /// Shape.
+    /// Topology.
     pub topology: Topology,
-    /// Weights, in the order that [`Topology`] states.
+    /// Weights in the order of [`Topology`].
     pub weights: Vec<f64>,
     /// Scaling of each channel.
     pub scaling: Vec<ChannelScaling>,
-    /// The length in metres that an output of 1 stands for, by coordinate.
+    /// Position of an output of 1, by coordinate.
     pub output_scale_m: Vec<f64>,
-    /// The surface.
+    /// Surface.
     pub extent: Extent,
-    /// Outcome of its training.
+    /// Outcome of the training.
     pub outcome: TrainingOutcome,
 }
 
-/// A network that locates.
+/// Fitted [`Network`].
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(from = "NetworkParts", into = "NetworkParts")]
 pub struct NetworkLocator {
     parts: NetworkParts,
-    /// `None` where a file's numbers do not fit together, which [`Locate::check`] reports.
+    /// `None` for an inconsistent file.
     network: Option<PreparedNetwork>,
 }
 
@@ -569,16 +560,15 @@ impl NetworkParts {
     }
 }
 
-/// Channels for which the inputs lie on the stack.
 const FEW_CHANNELS: usize = 16;
 
 impl NetworkLocator {
-    /// The parts of the network.
+    /// Parts of the network.
     pub fn parts(&self) -> &NetworkParts {
         &self.parts
     }
 
-    /// The position for a reading with as many channels as the network has inputs; `None` for another number.
+    /// Returns the position for a reading.
     pub fn position(&self, reading: &[f64]) -> Option<Position> {
         let (mut few, mut many) = ([0.0; FEW_CHANNELS], Vec::new());
         let inputs = if let Some(inputs) = few.get_mut(..reading.len()) {

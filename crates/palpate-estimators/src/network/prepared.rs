@@ -1,15 +1,12 @@
-//! The forward pass of one network over one reading, four nodes a register.
+//! Forward pass of one network, four nodes per register.
 //!
-//! The pass is bound by latency. A layer waits for the one below through four multiply-adds, the logistic function's dozen steps and its
-//! division, some seventy cycles; the machine's window covers little of the next reading meanwhile. Hence multiply-adds that round once, a
-//! quotient for 2^r rather than a long polynomial, and registers of four: eight lanes would save work, but not latency.
+//! Latency bounds the pass, hence fused multiply-adds, a rational 2^r and registers of four.
 
 use super::{Activation, Topology};
 use palpate_core::{BufferMismatch, Logistic};
 use palpate_numerics::simd::{Kernel, Real, Simd, Vector, run_loops};
 
-/// A network in double precision with its weights in columns, as vector units need them. With weights of size 1 its outputs are those of
-/// [`palpate_core::Network::forward_into`] to within 10⁻¹⁴.
+/// Network with weights in columns. Outputs equal [`palpate_core::Network::forward_into`] within 10⁻¹⁴.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PreparedNetwork {
     layers: Vec<Layer>,
@@ -18,8 +15,7 @@ pub struct PreparedNetwork {
 }
 
 impl PreparedNetwork {
-    /// Takes a network's shape and its weights, in the order that [`Topology`] states. `None` for a shape with fewer than two layers or with a layer
-    /// without nodes, and for another number of weights than the shape needs.
+    /// Prepares weights in the order of [`Topology`]; `None` for an invalid topology or number of weights.
     pub fn new(topology: &Topology, weights: &[f64]) -> Option<Self> {
         let usable = topology.layers() > 0 && !topology.sizes.contains(&0);
         if !usable || topology.checked_weight_count() != Some(weights.len()) {
@@ -29,10 +25,10 @@ impl PreparedNetwork {
         Some(Self { layers: Layer::all(topology, weights), inputs, outputs })
     }
 
-    /// a = f(W x + b), layer by layer, from scaled inputs to outputs.
+    /// Computes a = f(W x + b) by layer.
     ///
     /// # Errors
-    /// [`BufferMismatch`] when `inputs` or `outputs` have another length than the network's.
+    /// [`BufferMismatch`] for a wrong length.
     pub fn forward_into(&self, inputs: &[f64], outputs: &mut [f64]) -> Result<(), BufferMismatch> {
         check(self.inputs, inputs.len())?;
         check(self.outputs, outputs.len())?;
@@ -45,26 +41,23 @@ fn check(needed: usize, found: usize) -> Result<(), BufferMismatch> {
     if needed == found { Ok(()) } else { Err(BufferMismatch { needed, found }) }
 }
 
-/// Four numbers, one a node.
 type Four = [f64; 4];
 
-/// Weights of four nodes; a column never crosses a cache line.
+/// Aligned, so that no column crosses a cache line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(32))]
 struct Column(Four);
 
-/// A layer, its weights in columns.
 #[derive(Clone, Debug, PartialEq)]
 struct Layer {
     activation: Activation,
     inputs: usize,
     nodes: usize,
-    /// For every four nodes a column an input, and the biases. Missing nodes have weights of 0.
+    /// Missing nodes have weights of 0.
     columns: Vec<Column>,
 }
 
 impl Layer {
-    /// All layers of a network with as many weights as `topology` needs.
     fn all(topology: &Topology, mut weights: &[f64]) -> Vec<Self> {
         let mut layers = Vec::with_capacity(topology.layers());
         for k in 0..topology.layers() {
@@ -85,13 +78,12 @@ impl Layer {
         (self.inputs, self.nodes) == (inputs, nodes)
     }
 
-    /// Registers for its outputs.
     fn registers(&self) -> usize {
         self.nodes.div_ceil(4)
     }
 }
 
-/// Marker of a number of inputs or nodes that is known only at run time.
+/// Size known only at run time.
 const ANY: usize = 0;
 
 #[inline(always)]
@@ -99,10 +91,8 @@ fn known_or<const KNOWN: usize>(count: usize) -> usize {
     if KNOWN == ANY { count } else { KNOWN }
 }
 
-/// Registers of the widest layer for which a layer's outputs lie on the stack: 32 nodes.
 const FEW_REGISTERS: usize = 8;
 
-/// A pass of inputs through layers; there is at least one layer.
 struct Pass<'a> {
     layers: &'a [Layer],
     inputs: &'a [f64],
@@ -121,7 +111,7 @@ impl Kernel for Pass<'_> {
 
 #[inline(always)]
 fn run<V: Vector<4, Real = f64>>(layers: &[Layer], inputs: &[f64], outputs: &mut [f64]) {
-    // The paper's shape: where the loops unroll, more of the next reading fits into the machine's window.
+    // The paper's shape: unrolled loops let more of the next reading into the machine's window.
     if let [first, last] = layers
         && first.is(8, 10)
         && last.is(10, 1)
@@ -142,7 +132,6 @@ fn run<V: Vector<4, Real = f64>>(layers: &[Layer], inputs: &[f64], outputs: &mut
     }
 }
 
-/// [`run`] for any shape, with room for the widest layer's outputs twice.
 #[inline(always)]
 fn run_any<'a, V: Vector<4, Real = f64>>(
     layers: &[Layer],
@@ -178,7 +167,7 @@ fn pass<V: Vector<4, Real = f64>, const INPUTS: usize, const NODES: usize>(
     }
 }
 
-/// Σ w·x + b in four independent sums, input i in sum i modulo 4.
+/// Four independent sums, input i in sum i modulo 4.
 #[inline(always)]
 fn weighted_sums<V: Vector<4, Real = f64>>(columns: &[Column], x: &[f64]) -> V {
     let (columns, biases) = columns.split_at(x.len());
@@ -197,7 +186,7 @@ fn weighted_sums<V: Vector<4, Real = f64>>(columns: &[Column], x: &[f64]) -> V {
     (sums[0] + sums[2]) + (sums[1] + sums[3])
 }
 
-/// σ by [`Logistic`]. The bound is the first operand of a comparison, which returns the second where it is not a number.
+/// The bound is the first operand of a comparison, which returns the second for NaN.
 #[inline(always)]
 fn logistic<V: Vector<4, Real = f64>>(z: V) -> V {
     let ([e0, e1, e2], [o0, o1]) = (Logistic::EVEN.map(V::splat), Logistic::ODD.map(V::splat));
@@ -226,7 +215,6 @@ mod tests {
         (0..topology.weight_count()).map(|k| (k as f64 * 1.3).sin()).collect()
     }
 
-    /// The pass of `palpate-core`.
     fn core(topology: &Topology, weights: &[f64], inputs: &[f64]) -> Vec<f64> {
         let network = topology.network(weights);
         let mut outputs = vec![0.0; topology.outputs()];

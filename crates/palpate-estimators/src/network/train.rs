@@ -1,12 +1,10 @@
-//! Training by back-propagation with momentum: one network, or N side by side, one a lane.
+//! Back-propagation with momentum, for N networks side by side.
 //!
-//! Symbols: w weights, Δ the last step of the weights, x inputs of a layer, z weighted sums, a outputs, t targets,
-//! δ = −∂E/∂z, η learning rate, α momentum.
+//! Symbols: w weights, Δ last step, x inputs of a layer, z weighted sums, a outputs, t targets, δ = −∂E/∂z, η
+//! learning rate, α momentum.
 //!
-//! The bound: the fused pass over the first layer reads w and its predecessor, writes the new w, and spends four
-//! multiply-add slots on each; the L1 ports and the two vector units saturate together. Hence three choices. Δ is kept
-//! as w − w_before, so that one store a weight suffices and the two buffers change places. A weight is updated and at
-//! once used for the next pattern's sum, while it is in a register. And patterns are looked up by permuting registers.
+//! The fused first layer saturates L1 ports and vector units. Hence Δ = w − w_before, with one store per
+//! weight; weights are updated and used while in a register; patterns are looked up by permuting registers.
 
 mod order;
 
@@ -21,7 +19,7 @@ use order::{OrderDrawer, Streams, column_len};
 use palpate_numerics::simd::{InstructionSet, Kernel, LOOK_UP, Real, Simd, Vector, run_loops};
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// Width of a floating-point number in training.
+/// Floating-point width of training.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Precision {
@@ -33,7 +31,7 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// Number of networks that train side by side.
+    /// Number of networks side by side.
     pub fn lanes(self) -> usize {
         match self {
             Self::F64 => 8,
@@ -42,22 +40,21 @@ impl Precision {
     }
 }
 
-/// Training task of every network of a group.
+/// Training task of a group of networks.
 #[derive(Clone, Copy, Debug)]
 pub struct TrainingTask<'a> {
-    /// Shape of the network; its inputs and outputs are those of the patterns.
+    /// Topology.
     pub topology: &'a Topology,
-    /// Training patterns, between 1 and [`TrainingSet::MOST`].
+    /// Training patterns, from 1 to [`TrainingSet::MOST`].
     pub patterns: &'a TrainingSet,
     /// Training rule.
     pub rule: &'a BackPropagation,
 }
 
-/// Trains the queue's networks, as many at once as `precision` has lanes. A seed gives the same network in any lane or thread, and with any other
-/// seeds.
+/// Trains the queue's networks, equal in any lane and thread.
 ///
 /// # Errors
-/// [`Cancelled`] when `watch`, called every epoch, stops it; unfinished networks are discarded.
+/// [`Cancelled`], with unfinished networks discarded.
 pub fn train_many(
     set: InstructionSet,
     precision: Precision,
@@ -68,10 +65,10 @@ pub fn train_many(
     set.run(Training::<false> { precision, task, queue, watch })
 }
 
-/// Trains one network: the same bits as [`train_many`] gives for the seed.
+/// Trains one network, equal to [`train_many`].
 ///
 /// # Errors
-/// [`Cancelled`] when `watch`, called every epoch, stops it.
+/// [`Cancelled`].
 pub fn train_one(
     precision: Precision,
     task: &TrainingTask,
@@ -84,8 +81,7 @@ pub fn train_one(
     Ok(trained.expect("an unwatched queue is trained to its end").1)
 }
 
-/// Training of networks: one after the other where they are `ALONE`, as a single network trains faster without idle lanes; else side by side, one a
-/// lane.
+/// A single network is faster `ALONE`, without idle lanes.
 struct Training<'a, const ALONE: bool> {
     precision: Precision,
     task: &'a TrainingTask<'a>,
@@ -114,7 +110,6 @@ impl<const ALONE: bool> Kernel for Training<'_, ALONE> {
     }
 }
 
-/// Trains every network of the queue with the vectors `V` of `S`. When a lane's network has finished, the lane takes the next seed.
 #[inline(always)]
 fn train<S: Simd, V: Vector<N>, const N: usize>(
     task: &TrainingTask,
@@ -123,8 +118,8 @@ fn train<S: Simd, V: Vector<N>, const N: usize>(
 ) -> Result<(), Cancelled> {
     let topology = task.topology;
     let row_lens: Vec<usize> = (0..topology.layers()).map(|k| topology.row_len(k)).collect();
-    // Where registers have room for the inputs of two patterns, a shape fixed at compile time, the paper's, saves a tenth of the time. Elsewhere it
-    // saves a fiftieth, which does not pay for the code.
+    // Where registers have room for the inputs of two patterns, a shape fixed at compile time saves a tenth
+    // of the time; elsewhere only a fiftieth.
     if const { S::REGISTERS >= 2 * 9 } && row_lens == [9, 11] {
         train_shape::<V, N, 9, 11>(task, queue, watch)
     } else {
@@ -132,17 +127,15 @@ fn train<S: Simd, V: Vector<N>, const N: usize>(
     }
 }
 
-/// Marker of a row length that is known only at run time.
+/// Row length known only at run time.
 const ANY: usize = 0;
 
-/// The row length `len`, as a constant where the shape is known: then loops over a row unroll, and the inputs of the
-/// paper's eight sensors stay in registers.
+/// Row length, constant for the paper's shape, which keeps eight inputs in registers.
 #[inline(always)]
 fn row_len<const KNOWN: usize>(len: usize) -> usize {
     if KNOWN == ANY { len } else { KNOWN }
 }
 
-/// [`train`] for rows of `FIRST` weights in the first layer and `UPPER` in every other.
 #[inline(always)]
 fn train_shape<V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize>(
     task: &TrainingTask,
@@ -164,29 +157,24 @@ fn train_shape<V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: us
     Ok(())
 }
 
-/// The network in one lane.
 #[derive(Clone, Copy)]
 struct Occupant {
     seed: u64,
     epochs: u32,
 }
 
-/// One layer of N networks.
 struct Layer<V> {
     activation: Activation,
     row_len: usize,
-    /// w, row by row.
     weights: Vec<V>,
-    /// w before the last update.
+    /// w of the last update.
     before: Vec<V>,
-    /// z, then a; followed by the constant 1 for the biases.
+    /// z, then a, then 1 for the biases.
     outputs: Vec<V>,
-    /// δ, gathered over the layer above.
     deltas: Vec<V>,
 }
 
 impl<V: Copy> Layer<V> {
-    /// Weighted layer `k` with weights of 0.
     fn new(topology: &Topology, k: usize, zero: V, one: V) -> Self {
         let (weights, nodes) = (topology.rows(k) * topology.row_len(k), topology.rows(k));
         Self {
@@ -202,16 +190,15 @@ impl<V: Copy> Layer<V> {
 
 struct Group<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> {
     task: &'t TrainingTask<'t>,
-    /// The patterns, a column an input and a column an output.
     input_table: Table<V::Real>,
     target_table: Table<V::Real>,
     occupants: [Option<Occupant>; N],
     streams: Streams<N>,
     drawer: OrderDrawer,
-    /// This epoch's patterns, a row a presentation; and the next epoch's. The first pattern of the next epoch ends this one.
+    /// Patterns of this and the next epoch.
     order: Vec<[u32; N]>,
     next_order: Vec<[u32; N]>,
-    /// x of this pattern and of the next, each followed by the constant 1 for the biases.
+    /// x of this and the next pattern, then 1 for the biases.
     inputs: Vec<V>,
     next_inputs: Vec<V>,
     targets: Vec<V>,
@@ -244,7 +231,6 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
         self.occupants.iter().any(Option::is_some)
     }
 
-    /// Puts the queue's next network into a lane, or leaves the lane idle.
     fn start_next(&mut self, lane: usize, queue: &mut dyn SeedQueue<TrainedNetwork>) {
         let Some(seed) = queue.next_seed() else {
             self.occupants[lane] = None;
@@ -269,7 +255,7 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
         self.streams.set(lane, &stream);
     }
 
-    /// Hands over the networks that finished training with this epoch; true when a lane has a new one.
+    /// True where a lane has a new network.
     fn retire(&mut self, errors: [V::Real; N], queue: &mut dyn SeedQueue<TrainedNetwork>) -> bool {
         let mut replaced = false;
         for (lane, error) in errors.into_iter().enumerate() {
@@ -288,7 +274,6 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
         replaced
     }
 
-    /// z of the first layer for the first pattern; afterwards the pass over the layer keeps one pattern ahead.
     #[inline(always)]
     fn sum_first_pattern(&mut self) {
         self.input_table.look_up(&self.order[0], &mut self.inputs);
@@ -298,7 +283,6 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
         }
     }
 
-    /// Presents every pattern once; returns the sums of squared errors.
     #[inline(always)]
     fn run_epoch(&mut self) -> V {
         if self.task.rule.order == PresentationOrder::Shuffled {
@@ -319,7 +303,6 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
         error
     }
 
-    /// The pass from the first layer's sums to the outputs.
     #[inline(always)]
     fn forward(&mut self) {
         for k in 0..self.layers.len() {
@@ -335,7 +318,6 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
         }
     }
 
-    /// δ of the output layer; adds the squared errors to `error`.
     #[inline(always)]
     fn compare_with_targets(&mut self, mut error: V) -> V {
         if let Some(layer) = self.layers.last_mut() {
@@ -348,7 +330,6 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
         error
     }
 
-    /// Back-propagation from the output layer down to the second: sends δ to the layer below, then updates the weights.
     #[inline(always)]
     fn backward(&mut self) {
         let (eta, alpha) = rates::<V, N>(self.task.rule);
@@ -370,7 +351,6 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
         }
     }
 
-    /// Updates the first layer with this pattern and sums it for the next, in one pass.
     #[inline(always)]
     fn update_first_layer(&mut self) {
         let (eta, alpha) = rates::<V, N>(self.task.rule);
@@ -401,7 +381,7 @@ fn weighted_sum<V: Vector<N>, const N: usize, const KNOWN: usize>(row: &[V], inp
     sum
 }
 
-/// Step of one node's weights: η δ x + α Δ.
+/// η δ x + α Δ for one node.
 #[derive(Clone, Copy)]
 struct Step<V> {
     delta: V,
@@ -419,7 +399,6 @@ impl<V> Step<V> {
     }
 }
 
-/// Updates a node's weights, and sums them over the next pattern's inputs.
 #[inline(always)]
 fn update_and_sum<V: Vector<N>, const N: usize, const KNOWN: usize>(
     row: &[V],
@@ -439,7 +418,6 @@ fn update_and_sum<V: Vector<N>, const N: usize, const KNOWN: usize>(
     sum
 }
 
-/// Adds a node's share to the δ of the layer below, and updates its weights.
 #[inline(always)]
 fn update_and_send_back<V: Vector<N>, const N: usize, const KNOWN: usize>(
     row: &[V],
@@ -462,15 +440,13 @@ fn set_lane<V: Vector<N>, const N: usize>(vector: &mut V, lane: usize, value: V:
     *vector = V::load(&values);
 }
 
-/// Columns of numbers, one number a pattern.
 struct Table<R> {
-    /// Length of a column: a power of two, so that no pick, masked to it, lies outside.
+    /// Power of two, so that a masked pick never lies outside.
     column_len: usize,
     values: Vec<R>,
 }
 
 impl<R: Real> Table<R> {
-    /// Turns rows of `width` values into columns.
     fn from_rows(rows: &[f64], width: usize) -> Self {
         let column_len = column_len(rows.len() / width.max(1));
         let mut values = vec![R::from_f64(0.0); column_len * width];
@@ -480,7 +456,7 @@ impl<R: Real> Table<R> {
         Self { column_len, values }
     }
 
-    /// For every column, the value of each lane's pick; only the low bits of a pick count.
+    /// Only the low bits of a pick count.
     #[inline(always)]
     fn look_up<V: Vector<N, Real = R>, const N: usize>(&self, picks: &[u32; N], values: &mut [V]) {
         if self.column_len == LOOK_UP {

@@ -12,18 +12,16 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// The founding paper's beam, with a known or an unknown force.
 fn beam(force_n: Option<f64>) -> Setup {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0)).unwrap();
     Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0))).unwrap().with_force(force_n).unwrap()
 }
 
-/// Presses of 3 N, ten times at twenty places.
 fn presses() -> Recording {
     beam(Some(newtons(3.0))).simulate(&Training::even(20).repeated(10), 1).unwrap()
 }
 
-/// A locator of every learnt kind. Networks are trained briefly, to keep the test short.
+/// Locator of every learnt kind. Networks are trained briefly, to keep the test short.
 fn learnt(setup: &Setup) -> Vec<Locator> {
     let presses = presses();
     let all = contenders(setup, &Estimator::default(), 20 * presses.rows.len());
@@ -35,7 +33,6 @@ fn learnt(setup: &Setup) -> Vec<Locator> {
     locators
 }
 
-/// Share of the readings, in %, with an estimate that fulfils a condition.
 fn percent(
     locator: &Locator,
     readings: &[(Position, Vec<f64>)],
@@ -45,7 +42,7 @@ fn percent(
     100.0 * so.count() as f64 / readings.len() as f64
 }
 
-/// Readings of 5 µm noise, of loads that `load` draws at a place within 20–380 mm.
+/// Readings of 5 µm noise, with loads by `load` within 20–380 mm.
 fn readings(
     load: impl Fn(&dyn Fn(f64, f64) -> Vec<f64>, f64, &mut Xoshiro256PlusPlus) -> Vec<f64>,
 ) -> Vec<(Position, Vec<f64>)> {
@@ -137,7 +134,7 @@ fn a_file_keeps_the_check_and_refuses_a_wrong_one() {
         .unwrap();
     let text = locator.to_json().unwrap();
     assert_eq!(Locator::from_json(&text).unwrap(), locator);
-    // The first number of the check that is not 0.
+    // First number of the check other than 0.
     let (before, check) = text.split_at(text.find("\"check\"").unwrap());
     let at = check.find(|c: char| ('1'..='9').contains(&c)).unwrap();
     let wrong = format!("{before}{}e80{}", &check[..=at], &check[at + 1..]).replacen("e80.", "e80, 0.", 1);
@@ -151,7 +148,7 @@ fn checks_learn_from_few_rows_of_all_places() {
     let many = setup.simulate(&Training::even(40).repeated(100), 0).unwrap();
     let few = ReadingCheck::thinned(&many);
     assert_eq!((few.rows.len(), few.distinct_positions().len()), (ReadingCheck::MOST_ROWS, 40));
-    // One place after the other, over and over: one row in eight would be five places of the forty.
+    // Positions in turn: one row in eight would cover five of the forty.
     let in_turn: Vec<usize> = (0..many.rows.len()).map(|i| i % 40 * 100 + i / 40).collect();
     let few = ReadingCheck::thinned(&many.subset(&in_turn)).into_owned();
     assert_eq!((few.rows.len(), few.distinct_positions().len()), (ReadingCheck::MOST_ROWS, 40));
@@ -173,7 +170,8 @@ fn comparisons_of_unknown_forces_judge_by_several() {
 
 #[test]
 fn a_gaussian_process_is_as_good_at_other_forces() {
-    // ln‖r‖ determines the position at the single force of the presses, and would shift it by 25 mm at half that force.
+    // ln‖r‖ determines the position at the one force of the presses, and would shift it by 25 mm at half that
+    // force.
     let setup = beam(None);
     let locator = Estimator::GaussianProcess(Default::default())
         .fit_without_interval_check(FitTask::new(&setup, &presses()))
@@ -185,7 +183,7 @@ fn a_gaussian_process_is_as_good_at_other_forces() {
     assert!((0.9..1.4).contains(&ratio), "{ratio} × the limit");
 }
 
-/// A soft sheet that influence functions explain less well than a function of its features does.
+/// Soft sheet that influence functions explain less well than regression does.
 #[test]
 fn own_intervals_stand_where_they_are_shorter() {
     let Some((setup, recording)) = crate::fixtures::sheet_recording() else { return };
@@ -201,7 +199,7 @@ fn own_intervals_stand_where_they_are_shorter() {
     assert_eq!(&serde_json::from_str::<Box<ReadingCheck>>(&text).unwrap(), check);
     let neither = serde_json::from_str::<ReadingCheck>("{}").unwrap_err();
     assert!(neither.to_string().contains("either `influence` or `digit`"), "{neither}");
-    // For the pressed forces, and beyond them.
+    // At the pressed forces, and beyond them.
     let widened = ReadingCheck { own_intervals: None, ..(**check).clone() };
     let extent = setup.surface().extent();
     let (mut kept, mut beyond) = (0, 0);

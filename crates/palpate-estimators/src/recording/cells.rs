@@ -1,4 +1,4 @@
-//! The fields of one line, with errors that contain line and column.
+//! Fields of one CSV line.
 
 use super::columns::{Column, Header, ValueColumn};
 use super::csv_error::{CsvError, CsvProblem};
@@ -12,7 +12,6 @@ use palpate_mechanics::units::{Dimension, Unit};
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// One line of a CSV file, cut into fields.
 pub(super) struct Cells<'a> {
     line: usize,
     text: &'a str,
@@ -22,7 +21,6 @@ pub(super) struct Cells<'a> {
 }
 
 impl<'a> Cells<'a> {
-    /// Cuts line number `line` of a file of this dialect into fields.
     pub fn parse(
         line: usize,
         text: &'a str,
@@ -35,48 +33,41 @@ impl<'a> Cells<'a> {
         }
     }
 
-    /// Fields with these texts, which belong to no line.
+    /// Fields that belong to no line.
     pub fn of_texts(texts: &'a [String], dialect: &'a mut Dialect, groupings: &'a mut Groupings) -> Self {
         let field = |text: &'a String| Field { value: Cow::Borrowed(text), span: 0..0 };
         Self { line: 0, text: "", fields: texts.iter().map(field).collect(), dialect, groupings }
     }
 
-    /// Dialect of the file so far.
     pub fn dialect(&self) -> &Dialect {
         self.dialect
     }
 
-    /// Records that this line contains the units of the columns.
     pub fn note_units(&mut self) {
         self.dialect.units_line = Some(self.line);
     }
 
-    /// Records that this line is not a row.
     pub fn note_line(&mut self) {
         self.dialect.note_line(self.line, self.text);
     }
 
-    /// Refuses the line if marks in column `index` may be separators of thousands.
     pub fn check_grouping(&self, index: usize) -> Result<(), CsvError> {
         self.groupings.doubt_in(index, &self.dialect.source).map_or(Ok(()), Err)
     }
 
-    /// Number of fields.
     pub fn width(&self) -> usize {
         self.fields.len()
     }
 
-    /// Text of each field.
     pub fn texts(&self) -> impl Iterator<Item = &str> {
         self.fields.iter().map(|field| field.value.as_ref())
     }
 
-    /// True where all fields are empty.
     pub fn is_blank(&self) -> bool {
         self.fields.iter().all(|field| field.value.is_empty())
     }
 
-    /// Refuses a row that has more or fewer fields than `expected`; further empty fields at its end do not count.
+    /// Further empty fields at the end are allowed.
     pub fn check_width(&self, expected: usize) -> Result<(), CsvError> {
         let beyond = self.fields.get(expected..);
         match self.width() {
@@ -92,14 +83,14 @@ impl<'a> Cells<'a> {
         }
     }
 
-    /// True where commas between fields may have cut numbers at their decimal commas: all fields are whole numbers.
+    /// Commas may have split numbers at their decimal commas.
     fn looks_cut_at_decimals(&self) -> bool {
         let whole = |field: &Field| field.value.bytes().all(|byte| byte.is_ascii_digit() || byte == b'-');
         self.dialect.separator == Separator::Comma && self.fields.iter().all(whole)
     }
 
-    /// Index of a column of values among the fields of every line, from this first line of the file. A heading with another unit than that of
-    /// `values` is refused; `key` is the key of the unit in a rig.
+    /// Field of a column of values, checked against the unit in the heading; `key` is the rig's key of the
+    /// unit.
     pub fn find_values(
         &mut self,
         values: &ValueColumn,
@@ -127,7 +118,7 @@ impl<'a> Cells<'a> {
         Err(self.error(index, CsvProblem::OtherUnit { said, read_as: values.unit, key }))
     }
 
-    /// Index of `column` among the fields of every line, from this first line of the file: by its heading, or by its heading without a unit.
+    /// Field by heading, with or without the unit, or by number.
     pub fn find(&self, column: &Column, header: Header) -> Result<usize, CsvError> {
         let count = self.width();
         let name = match column {
@@ -168,7 +159,6 @@ impl<'a> Cells<'a> {
         }
     }
 
-    /// True where a field has the name `column`, with or without a unit, or its number.
     pub fn has(&self, column: &Column) -> bool {
         match column {
             Column::Name(name) => self.fields.iter().any(|field| {
@@ -178,7 +168,7 @@ impl<'a> Cells<'a> {
         }
     }
 
-    /// The finite number in field `index`, in SI units.
+    /// Finite number in SI units.
     pub fn number(&mut self, index: usize, unit: Unit) -> Result<f64, CsvError> {
         let value = self.read(index, |text, dialect| dialect.number(text, unit))?;
         if !self.groupings.is_decided(index) {
@@ -190,23 +180,19 @@ impl<'a> Cells<'a> {
         Ok(value)
     }
 
-    /// True where field `index` is empty or missing.
     pub fn is_empty(&self, index: usize) -> bool {
         self.fields.get(index).is_none_or(|field| field.value.is_empty())
     }
 
-    /// Whether field `index` marks an untouched row.
     pub fn is_marked(&self, index: usize) -> Result<bool, CsvError> {
         let text = self.fields.get(index).map_or("", |field| field.value.as_ref());
         is_mark(text).ok_or_else(|| self.error(index, CsvProblem::NotAMark { text: text.to_owned() }))
     }
 
-    /// Counts a row without a position.
     pub fn count_without_position(&mut self) {
         self.dialect.without_position += 1;
     }
 
-    /// The time in field `index`, in seconds.
     pub fn time(&mut self, index: usize, unit: Unit, clock: &mut Clock) -> Result<f64, CsvError> {
         self.read(index, |text, dialect| clock.read(text, || dialect.number(text, unit)))
     }
@@ -222,7 +208,6 @@ impl<'a> Cells<'a> {
         parse(&field.value, self.dialect).map_err(|problem| self.error(index, problem))
     }
 
-    /// A problem with field `index`.
     pub fn error(&self, index: usize, problem: CsvProblem) -> CsvError {
         let mut error = self.line_error(problem);
         if let Some(place) = &mut error.place {
@@ -232,23 +217,19 @@ impl<'a> Cells<'a> {
         error
     }
 
-    /// A problem with the whole line.
     pub fn line_error(&self, problem: CsvProblem) -> CsvError {
         problem.in_line(&self.dialect.source, self.line, self.text.to_owned(), 0..self.text.len())
     }
 }
 
-/// One field: its value and its place in the line.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Field<'a> {
-    /// The value, without the spaces and quotes around it.
     pub value: Cow<'a, str>,
-    /// Bytes of the line, without the spaces around the field.
     pub span: Range<usize>,
 }
 
-/// Cuts `line` at its separators, except within double quotes; a doubled quote within quotes is a quote (RFC 4180, but a field ends with its line,
-/// so that every row has one line number). The error is the range from an unclosed quote to the end of the line.
+/// Splits at separators outside double quotes (RFC 4180, but a field ends with its line). The error is the
+/// range from an unclosed quote.
 pub(super) fn split(line: &str, separator: Separator) -> Result<Vec<Field<'_>>, Range<usize>> {
     if separator == Separator::Blanks {
         return split_at_blanks(line);
@@ -274,8 +255,7 @@ pub(super) fn split(line: &str, separator: Separator) -> Result<Vec<Field<'_>>, 
     }
 }
 
-/// Cuts `line` at its runs of blanks, except within double quotes. A unit in brackets belongs to the name before it: `Force [N]` is one
-/// field, `[mm] [N]` are two.
+/// A unit in brackets belongs to the name before it: `Force [N]` is one field, `[mm] [N]` are two.
 fn split_at_blanks(line: &str) -> Result<Vec<Field<'_>>, Range<usize>> {
     let bytes = line.as_bytes();
     let is_blank = |b: u8| matches!(b, b' ' | b'\t');
@@ -311,7 +291,6 @@ fn end_of_field(bytes: &[u8], from: usize, is_separator: impl Fn(u8) -> bool) ->
     from + bytes[from..].iter().take_while(|b| !is_separator(**b)).count()
 }
 
-/// The first byte after the quoted text that begins at `opening`.
 fn closing_quote(bytes: &[u8], opening: usize) -> Option<usize> {
     let mut at = opening + 1;
     loop {

@@ -1,4 +1,4 @@
-//! Roles of the columns of a CSV file.
+//! Roles of CSV columns.
 
 use std::fmt;
 
@@ -14,48 +14,47 @@ use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::Unit;
 
-/// Roles of a file's columns. Columns without a role are ignored.
+/// Roles of columns; others are ignored.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Columns {
-    /// Whether the first line names the columns.
+    /// Presence of a header.
     pub header: Header,
-    /// Columns of the contact position.
+    /// Position columns.
     pub position: PositionColumns,
-    /// The unit of length of the position columns.
+    /// Unit of position.
     pub position_unit: Unit,
-    /// Conversion of the file's coordinates to positions on the surface.
+    /// Conversion of coordinates.
     #[serde(default)]
     pub frame: Frame,
-    /// One column for each sensor, in the layout's order.
+    /// Sensor columns, in the layout's order.
     pub channels: Vec<ValueColumn>,
-    /// Column of the contact force, if there is one.
+    /// Force column.
     pub force: Option<ForceColumn>,
-    /// Column of the nuisance coordinate, or of the first of several, if there is one; see [`Row::nuisances`](super::Row::nuisances).
+    /// First nuisance coordinate; see [`Row::nuisances`](super::Row::nuisances).
     #[serde(default)]
     pub nuisance: Option<ValueColumn>,
-    /// Columns of the further nuisance coordinates.
+    /// Further nuisance coordinates.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub further_nuisances: Vec<ValueColumn>,
-    /// Column of the time, of numbers in this unit or of timestamps; `None` for the column `time_s`, if the header contains it. See
-    /// [`Row::time_s`](super::Row::time_s).
+    /// Time column; `None` for an optional `time_s`.
     #[serde(default)]
     pub time: Option<ValueColumn>,
-    /// Column that marks untouched rows, if there is one.
+    /// Mark of untouched rows.
     #[serde(default)]
     pub untouched: Option<Column>,
-    /// Times at which the surface is untouched.
+    /// Untouched times.
     #[serde(default)]
     pub untouched_times: Vec<TimeSpan>,
-    /// Greatest magnitude of the force of an untouched row, in newtons; `None` to determine it from the rows.
+    /// Greatest untouched force magnitude in newtons; `None` to recognise it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_zero_n: Option<f64>,
-    /// Separator of the fields; `None` to determine it from the first line.
+    /// Separator of the fields; `None` to detect it.
     #[serde(default)]
     pub separator: Option<Separator>,
-    /// Decimal mark; `None` to determine it from the first number.
+    /// Decimal mark; `None` to detect it.
     #[serde(default)]
     pub decimal: Option<Decimal>,
-    /// Treatment of rows that repeat the reading before them.
+    /// Treatment of repeated rows.
     #[serde(default, skip_serializing_if = "RepeatedReadings::is_auto")]
     pub repeated_readings: RepeatedReadings,
     /// Zero of the readings.
@@ -63,19 +62,18 @@ pub struct Columns {
     pub zero: Zero,
 }
 
-/// Conversion of a file's coordinates to positions on the surface: rounding, then subtraction of the origin.
+/// Conversion of file coordinates to surface positions: rounding, then subtraction of the origin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Frame {
-    /// The file's coordinates of the surface's left support or lower left corner, in metres.
+    /// Surface origin in file coordinates: left support or lower left corner.
     pub origin: Position,
-    /// Rounding step of the coordinates, in metres, greater than 0; `None` for no rounding. With rounding, presses of one place with slightly
-    /// different logged coordinates have one position.
+    /// Rounding step in metres, greater than 0; unites logged coordinates of one place.
     pub round_m: Option<f64>,
 }
 
 impl Frame {
-    /// Position on the surface of the file's (x, y), in metres.
+    /// Converts file coordinates, in metres.
     pub fn position(&self, x_m: f64, y_m: f64) -> Position {
         let rounded = |value_m: f64| match self.round_m {
             Some(step_m) => (value_m / step_m).round() * step_m,
@@ -85,23 +83,23 @@ impl Frame {
     }
 }
 
-/// Whether a CSV file's first line names its columns.
+/// Presence of column names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Header {
-    /// The first line names them.
+    /// Names in the first line.
     Present,
-    /// The first line is a row like the others; columns are identified by their numbers.
+    /// Numbered columns without names.
     Absent,
 }
 
-/// A column by its name in the header, or by its number.
+/// Column by name or number.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Column {
-    /// The name in the header, without the spaces around it.
+    /// Name, without surrounding spaces.
     Name(String),
-    /// The number, from 1.
+    /// Number, from 1.
     Number(usize),
 }
 
@@ -126,13 +124,13 @@ impl From<usize> for Column {
     }
 }
 
-/// The column or columns of the contact position.
+/// Position columns.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PositionColumns {
-    /// Along a one-dimensional surface.
+    /// One-dimensional surface.
     Along(Column),
-    /// Along and across a surface.
+    /// Two-dimensional surface.
     Plane {
         /// Along the length.
         x: Column,
@@ -141,37 +139,37 @@ pub enum PositionColumns {
     },
 }
 
-/// A column of numbers and their unit.
+/// Numeric column with its unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ValueColumn {
-    /// The column.
+    /// Column.
     pub column: Column,
-    /// The unit of its numbers.
+    /// Unit.
     pub unit: Unit,
 }
 
-/// The column of the contact force.
+/// Force column.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ForceColumn {
-    /// The column, and its unit of force.
+    /// Column and unit of force.
     pub values: ValueColumn,
-    /// Treatment of a file that lacks it.
+    /// Necessity of the column.
     pub need: Need,
 }
 
-/// Whether a file may lack a column.
+/// Necessity of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Need {
-    /// A file without it is refused.
+    /// Missing column: error.
     Required,
-    /// A file without it leaves the value unknown.
+    /// Missing column: unknown values.
     Optional,
 }
 
 impl Columns {
-    /// A file with positions, in millimetres, in one column, and with raw channels in the given columns, by name or by number from 1. If any
-    /// channel is given by number, the file has no header.
+    /// Columns with positions in millimetres and raw channels. A channel given by number means a file without
+    /// header.
     ///
     /// ```
     /// use palpate_estimators::recording::Columns;
@@ -187,7 +185,7 @@ impl Columns {
         Self::raw(PositionColumns::Along(position.into()), channels)
     }
 
-    /// A file as for [`along`](Self::along), but with positions in two columns, along and across.
+    /// As [`along`](Self::along), with positions along and across.
     pub fn plane<C: Into<Column>>(
         x: impl Into<Column>,
         y: impl Into<Column>,
@@ -196,7 +194,6 @@ impl Columns {
         Self::raw(PositionColumns::Plane { x: x.into(), y: y.into() }, channels)
     }
 
-    /// Raw channels in these columns, without a force.
     fn raw<C: Into<Column>>(position: PositionColumns, channels: impl IntoIterator<Item = C>) -> Self {
         let channels: Vec<ValueColumn> = channels
             .into_iter()
@@ -223,14 +220,14 @@ impl Columns {
         }
     }
 
-    /// Sets the column of the contact force, in newtons.
+    /// Sets the force column, in newtons.
     #[must_use]
     pub fn force(self, column: impl Into<Column>) -> Self {
         let values = ValueColumn { column: column.into(), unit: SensorKind::Reaction.unit() };
         Self { force: Some(ForceColumn { values, need: Need::Required }), ..self }
     }
 
-    /// Adds a nuisance coordinate in this column and unit, after the existing ones; see [`Row::nuisances`](super::Row::nuisances).
+    /// Appends a nuisance coordinate.
     #[must_use]
     pub fn nuisance(mut self, column: impl Into<Column>, unit: Unit) -> Self {
         let values = ValueColumn { column: column.into(), unit };
@@ -241,28 +238,26 @@ impl Columns {
         self
     }
 
-    /// Columns of all nuisance coordinates, the first one first.
+    /// All nuisance coordinates.
     pub fn nuisances(&self) -> impl Iterator<Item = &ValueColumn> {
         self.nuisance.iter().chain(&self.further_nuisances)
     }
 
-    /// Sets the column of the time of each row, in seconds or as timestamps.
+    /// Sets the time column, in seconds or timestamps.
     #[must_use]
     pub fn time(self, column: impl Into<Column>) -> Self {
         let unit = Unit::from_symbol("s").unwrap_or(Unit::NONE);
         Self { time: Some(ValueColumn { column: column.into(), unit }), ..self }
     }
 
-    /// Sets the frame of the file's coordinates.
+    /// Sets the frame.
     #[must_use]
     pub fn in_frame(self, frame: Frame) -> Self {
         Self { frame, ..self }
     }
 
-    /// The columns that palpate itself writes: `time_s` and `force_n` where they are known, `position_mm` (or `x_mm`, `y_mm`),
-    /// and for each channel its name and unit, as in `deflection_1_mm`; a raw channel has just its name.
-    ///
-    /// `channels` and `kinds` are the names and kinds of the sensors, one each.
+    /// Columns of palpate's own files: `time_s` and `force_n` if known, `position_mm` (or `x_mm`, `y_mm`),
+    /// and channels with units, as in `deflection_1_mm`.
     pub fn own(channels: &[String], kinds: &[SensorKind], extent: Extent) -> Self {
         let millimetre = SensorKind::Deflection.unit();
         let name = |name: &str| Column::Name(name.to_owned());

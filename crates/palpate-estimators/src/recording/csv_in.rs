@@ -1,4 +1,4 @@
-//! Reading recordings from CSV.
+//! CSV reader.
 
 use std::io::Read;
 
@@ -18,24 +18,23 @@ use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::Unit;
 
-/// Schema of a recording of a bench.
+/// Schema of recordings.
 #[derive(Clone, Copy, Debug)]
 pub struct Schema<'a> {
-    /// Roles of the columns.
+    /// Column roles.
     pub columns: &'a Columns,
-    /// The sensors; as many as `columns` has channels.
+    /// Sensors, one per channel.
     pub layout: &'a Layout,
-    /// Extent of the surface, within which contacts lie.
+    /// Surface extent.
     pub extent: Extent,
-    /// The known force of every contact, in newtons, for contacts without a force in the file.
+    /// Force of contacts without recorded force, in newtons.
     pub known_force_n: Option<f64>,
 }
 
-/// Reads a recording from a CSV file; `source` is its name in messages and in the provenance.
+/// Reads a recording; `source` is the file's name.
 ///
 /// # Errors
-/// [`CsvError`], with line and column: a missing column, a field that is not a finite number, a position off the
-/// surface, a row of another length than the header, an empty file, no rows, text that is not UTF-8.
+/// [`CsvError`], with line and column.
 pub fn read(source: &str, bytes: impl Read, schema: &Schema) -> Result<Recording, CsvError> {
     schema.check(source)?;
     let file = File::read(source, bytes)?;
@@ -57,11 +56,11 @@ pub fn read(source: &str, bytes: impl Read, schema: &Schema) -> Result<Recording
     Ok(recording)
 }
 
-/// Reads a recording from two CSV files, of readings and of contacts, that pair row by row. The time column is in the first file; the position and
-/// force columns are in the second. `readings` and `contacts` are each a name and its bytes.
+/// Reads a recording from two files that pair row by row: readings with times, and contacts. Each is a name
+/// and bytes.
 ///
 /// # Errors
-/// [`CsvError`] as for [`read`], and when the files have different numbers of rows.
+/// [`CsvError`], also for different numbers of rows.
 pub fn read_pair(
     readings: (&str, impl Read),
     contacts: (&str, impl Read),
@@ -106,7 +105,6 @@ impl Schema<'_> {
         }
     }
 
-    /// Checks that every span of untouched times contains a row.
     fn check_untouched_times(&self, source: &str, rows: &[Row]) -> Result<(), CsvError> {
         for span in &self.columns.untouched_times {
             let times = || rows.iter().filter_map(|row| row.time_s);
@@ -137,12 +135,12 @@ impl Schema<'_> {
     }
 }
 
-/// A row as written, before the recognition of forces that are 0 except for noise.
+/// Row before the recognition of forces that are 0 except for noise.
 #[derive(Debug)]
 struct OpenRow {
     row: Row,
     has_position: bool,
-    /// The error of the row, valid if its force is not 0.
+    /// Error unless the force is 0.
     refusal: Option<Box<CsvError>>,
 }
 
@@ -152,13 +150,11 @@ impl OpenRow {
         self
     }
 
-    /// The row, or its remaining error.
     fn settled(self) -> Result<Row, CsvError> {
         self.refusal.map_or(Ok(self.row), |error| Err(*error))
     }
 }
 
-/// The rows, with a force of 0 where it is 0 except for noise: by the bound of the columns, or by recognition from the rows.
 fn settle_forces(rows: Vec<OpenRow>, columns: &Columns, dialect: &mut Dialect) -> Result<Vec<Row>, CsvError> {
     if columns.force_zero_n.is_none() {
         let samples = rows.iter().map(|open| Sample { row: &open.row, has_position: open.has_position });
@@ -175,10 +171,9 @@ fn settle_forces(rows: Vec<OpenRow>, columns: &Columns, dialect: &mut Dialect) -
     rows.into_iter().map(settle).collect()
 }
 
-/// A file in memory.
 pub(super) struct File<'s> {
     pub source: &'s str,
-    /// In UTF-8, if the encoding is UTF-8 or UTF-16.
+    /// UTF-8, or the original bytes of another encoding.
     content: Vec<u8>,
     digest: String,
     pub is_utf16: bool,
@@ -196,13 +191,12 @@ impl<'s> File<'s> {
         Ok(Self { source, content: text, digest, is_utf16 })
     }
 
-    /// Lines with their ends. Some older spreadsheets end lines with carriage returns alone.
+    /// Some older spreadsheets end lines with carriage returns alone.
     pub fn lines(&self) -> impl Iterator<Item = &[u8]> {
         let end = if self.content.contains(&b'\n') { b'\n' } else { b'\r' };
         self.content.split_inclusive(move |byte| *byte == end)
     }
 
-    /// Every row, read by `row`, and the dialect. `find` determines the columns from the heading.
     fn rows<C, T>(
         &self,
         columns: &Columns,
@@ -230,7 +224,6 @@ impl<'s> File<'s> {
     }
 }
 
-/// Fields of a row for the position, force and nuisance coordinates of the contact.
 #[derive(Clone, Debug)]
 struct ContactFields {
     x: usize,
@@ -267,7 +260,6 @@ impl ContactFields {
         Ok(Self { x, y, position_unit, frame: columns.frame, force, nuisances, untouched })
     }
 
-    /// The row of a contact at a time, with an empty reading.
     fn row(&self, cells: &mut Cells, schema: &Schema, time_s: Option<f64>) -> Result<OpenRow, CsvError> {
         let position = self.position(cells)?;
         let is_marked = self.is_marked(cells, schema, time_s)?;
@@ -305,7 +297,7 @@ impl ContactFields {
         Ok(OpenRow { row, has_position: true, refusal: None })
     }
 
-    /// The error of a press without a position, or with a position off the surface.
+    /// Error of a press without a position on the surface.
     fn refusal(
         &self,
         cells: &mut Cells,
@@ -323,7 +315,6 @@ impl ContactFields {
         }
     }
 
-    /// The position; `None` where its fields are empty.
     fn position(&self, cells: &mut Cells) -> Result<Option<Position>, CsvError> {
         let is_empty = cells.is_empty(self.x) && self.y.is_none_or(|y| cells.is_empty(y));
         if is_empty { Ok(None) } else { self.coordinates(cells).map(Some) }
@@ -339,14 +330,13 @@ impl ContactFields {
         self.nuisances.iter().map(|(field, unit)| cells.number(*field, *unit)).collect()
     }
 
-    /// True for a row that is marked as untouched, or with a time within an untouched span.
     fn is_marked(&self, cells: &Cells, schema: &Schema, time_s: Option<f64>) -> Result<bool, CsvError> {
         let is_time = |time_s| schema.columns.untouched_times.iter().any(|span| span.contains(time_s));
         let marked = self.untouched.map_or(Ok(false), |field| cells.is_marked(field))?;
         Ok(marked || time_s.is_some_and(is_time))
     }
 
-    /// The row of an untouched surface. The position has no meaning and is kept if it lies on the surface.
+    /// Keeps a meaningless position if it is on the surface.
     fn untouched_row(
         &self,
         cells: &mut Cells,
@@ -364,12 +354,11 @@ impl ContactFields {
     }
 }
 
-/// Field of a row for its time, where the file has one.
 #[derive(Clone, Copy, Debug)]
 struct TimeField(Option<(usize, Unit)>);
 
 impl TimeField {
-    /// The field of the named column, which is required, or of `time_s`, which is optional.
+    /// Required if named; `time_s` is optional.
     fn find(head: &mut Cells, columns: &Columns) -> Result<Self, CsvError> {
         let own =
             || Some(Column::from(TIME)).filter(|own| columns.header == Header::Present && head.has(own));
@@ -381,7 +370,6 @@ impl TimeField {
         time.map(field).transpose().map(Self)
     }
 
-    /// The field of the column, if the file has it.
     fn find_optional(head: &mut Cells, columns: &Columns) -> Result<Self, CsvError> {
         match Self::find(head, columns) {
             Err(CsvError { problem: CsvProblem::MissingColumn { .. }, .. }) => Ok(Self(None)),
@@ -394,24 +382,23 @@ impl TimeField {
     }
 }
 
-/// A parser of the lines of a stream, one by one. The first of them determine its columns.
+/// Line-by-line parser; the first lines determine the columns.
 pub trait LineParser {
-    /// The values of a line.
+    /// Values of a line.
     type Parsed;
 
-    /// Reads the next line; `None` for the header, a blank line or a comment (`#`). After an error the parser continues with the next line.
+    /// Parses the next line; `None` for the header, a blank line or a comment. Parsing continues after an
+    /// error.
     ///
     /// # Errors
-    /// [`CsvError`] with line and column: a header that lacks a channel or names one twice, another number of fields
-    /// than the header or the first row, a field that is not a finite number, text that is not UTF-8. For readings in time also a time or a
-    /// contact that is not a number, and a contact off the surface.
+    /// [`CsvError`], with line and column.
     fn parse_line(&mut self, line: &[u8]) -> Result<Option<Self::Parsed>, CsvError>;
 
-    /// Progress through the lines.
+    /// Progress.
     fn progress(&mut self) -> &mut dyn LineProgress;
 }
 
-/// Converts lines of CSV to readings; only the channel columns are required.
+/// Parser of readings; only channel columns are required.
 #[derive(Debug)]
 pub struct ReadingParser {
     lines: Lines<(ChannelFields, TimeField)>,
@@ -421,25 +408,25 @@ pub struct ReadingParser {
 }
 
 impl ReadingParser {
-    /// A parser for the lines of `source`, from the first one; the position and force columns are optional.
+    /// Creates a parser of `source`.
     pub fn new(source: &str, columns: &Columns) -> Self {
         let lines = Lines::new(source, Reading::of(columns, Origin::Stream));
         Self { lines, columns: columns.clone(), clock: Clock::default(), time_s: None }
     }
 
-    /// Time of the last reading in seconds, where its line has one.
+    /// Time of the last reading in seconds.
     pub fn time_s(&self) -> Option<f64> {
         self.time_s
     }
 
-    /// True where a column has the time.
+    /// True with a time column.
     pub fn has_time(&self) -> bool {
         self.lines.fields().is_some_and(|(_, time)| time.0.is_some())
     }
 }
 
 impl LineParser for ReadingParser {
-    /// One value per channel, in SI units.
+    /// Values in SI units.
     type Parsed = Vec<f64>;
 
     fn parse_line(&mut self, line: &[u8]) -> Result<Option<Vec<f64>>, CsvError> {
@@ -459,7 +446,6 @@ impl LineParser for ReadingParser {
     }
 }
 
-/// Fields of a row for the channels, in the layout's order.
 #[derive(Clone, Debug)]
 struct ChannelFields(Vec<(usize, Unit)>);
 
@@ -475,7 +461,7 @@ impl ChannelFields {
         self.0.iter().map(|(index, unit)| cells.number(*index, *unit)).collect()
     }
 
-    /// The reading of a line of a stream, refused at once if a number may have a mark of thousands.
+    /// A stream cannot wait for later numbers, so ambiguous thousands are an error at once.
     fn checked_reading(&self, cells: &mut Cells) -> Result<Vec<f64>, CsvError> {
         let reading = self.reading(cells)?;
         self.0.iter().try_for_each(|(index, _)| cells.check_grouping(*index))?;
@@ -483,28 +469,23 @@ impl ChannelFields {
     }
 }
 
-/// The column of time that palpate itself writes, in seconds.
 pub(super) const TIME: &str = "time_s";
 
-/// The columns of a second contact.
 pub(super) const SECOND: [&str; 2] = ["position_2_mm", "force_2_n"];
 
-/// A recording of moving contacts, with the time of every row and the second contact, if there is one.
-///
-/// The file of this recording has a `time_s` column beside the others, and two columns for a second contact. [`read`] ignores the columns of the
-/// second contact, as any column without a role.
+/// Recording of moving contacts; [`read`] ignores the columns of a second contact.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimedRecording {
-    /// The rows; a force of 0 marks an untouched row.
+    /// Rows.
     pub recording: Recording,
-    /// Time of each row, in seconds.
+    /// Times in seconds.
     pub times_s: Vec<f64>,
-    /// The second contact of each row; empty for a recording of one contact.
+    /// Second contacts; empty for a single contact.
     pub second: Vec<Contact>,
 }
 
 impl TimedRecording {
-    /// The true contacts of every row with a known force.
+    /// True contacts of rows with a force.
     pub fn truths(&self) -> Vec<Vec<Contact>> {
         let rows = self.recording.rows.iter().enumerate();
         let all = rows.filter_map(|(i, row)| {
@@ -514,25 +495,24 @@ impl TimedRecording {
     }
 }
 
-/// One line of readings in time.
+/// Timed reading.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimedReading {
-    /// Time in seconds, if the file has one.
+    /// Time in seconds.
     pub time_s: Option<f64>,
-    /// The true contacts, if the file contains them; the force is 0 for a contact that did not touch.
+    /// True contacts, with force 0 if untouched.
     pub truth: Option<Vec<Contact>>,
-    /// One value a channel, in SI units.
+    /// Values in SI units.
     pub reading: Vec<f64>,
 }
 
-/// Converts lines of CSV to readings in time; only the channel columns are required.
+/// Parser of timed readings; only channel columns are required.
 pub struct TimedParser<'a> {
     lines: Lines<TimedFields>,
     clock: Clock,
     schema: Schema<'a>,
 }
 
-/// Fields of a row for the time, the contacts and the channels.
 #[derive(Clone, Debug)]
 struct TimedFields {
     time: TimeField,
@@ -542,13 +522,13 @@ struct TimedFields {
 }
 
 impl<'a> TimedParser<'a> {
-    /// A parser for the lines of `source`, from the first one.
+    /// Creates a parser of `source`.
     pub fn new(source: &str, schema: Schema<'a>) -> Self {
         let lines = Lines::new(source, Reading::of(schema.columns, Origin::Stream));
         Self { lines, clock: Clock::default(), schema }
     }
 
-    /// True where a column has the time.
+    /// True with a time column.
     pub fn has_time(&self) -> bool {
         self.lines.fields().is_some_and(|fields| fields.time.0.is_some())
     }

@@ -1,4 +1,4 @@
-//! Writing recordings as CSV.
+//! CSV writer.
 
 use std::io::{self, Write};
 
@@ -8,11 +8,10 @@ use super::{Recording, Row, TimedRecording};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::Unit;
 
-/// Writes `recording` with the columns of [`Columns::own`], so that reading it back gives the same numbers.
+/// Writes the columns of [`Columns::own`] losslessly.
 ///
-/// The time and the force are written where every row has one. Nuisance coordinates are written as `nuisance_1`, `nuisance_2`, … in SI units, and
-/// are empty in rows without contact that have none. `extent` determines whether positions have one coordinate or two. `comment` states the origin
-/// of the recording, in a first line that begins with `#`.
+/// Times and forces are written if every row has one; nuisance coordinates are in SI units. `comment` is the
+/// first line, after `#`.
 ///
 /// ```
 /// use palpate_estimators::{arrangement::Training, recording, setup::Setup};
@@ -28,17 +27,17 @@ use palpate_mechanics::units::Unit;
 /// ```
 ///
 /// # Errors
-/// Every error of `out`.
+/// Errors of `out`.
 pub fn write(recording: &Recording, extent: Extent, comment: &str, out: impl Write) -> io::Result<()> {
     let own = Columns::own(&recording.channels, &recording.kinds, extent);
     write_as(recording, &with_nuisances(own, recording), comment, out)
 }
 
-/// Writes `recording` with the names, units and coordinates of these columns, so that reading by them gives the same numbers. Fields are separated
-/// by commas, for any separator of the columns. The time and the force are written where every row has one.
+/// Writes the given columns losslessly, separated by commas. Times and forces are written if every row has
+/// one.
 ///
 /// # Errors
-/// Every error of `out`.
+/// Errors of `out`.
 pub fn write_as(recording: &Recording, columns: &Columns, comment: &str, out: impl Write) -> io::Result<()> {
     let forces_known = recording.rows.iter().all(|row| row.force_n.is_some());
     let columns = Columns { force: columns.force.clone().filter(|_| forces_known), ..columns.clone() };
@@ -56,10 +55,10 @@ pub fn write_as(recording: &Recording, columns: &Columns, comment: &str, out: im
     write_lines(comment, std::iter::once(heading).chain(rows), out)
 }
 
-/// Writes a recording as [`write()`] does, with the time first.
+/// Writes a timed recording as [`write()`] does.
 ///
 /// # Errors
-/// Every error of `out`.
+/// Errors of `out`.
 pub fn write_timed(timed: &TimedRecording, extent: Extent, comment: &str, out: impl Write) -> io::Result<()> {
     let columns = Columns::own(&timed.recording.channels, &timed.recording.kinds, extent);
     let columns = with_nuisances(columns, &timed.recording);
@@ -77,7 +76,6 @@ pub fn write_timed(timed: &TimedRecording, extent: Extent, comment: &str, out: i
     write_lines(comment, std::iter::once(heading).chain(rows), out)
 }
 
-/// The columns with an additional one for each nuisance coordinate of the recording.
 fn with_nuisances(columns: Columns, recording: &Recording) -> Columns {
     let count = recording.rows.iter().map(|row| row.nuisances.len()).max().unwrap_or(0);
     (1..=count)
@@ -96,8 +94,7 @@ fn write_lines(
     out.flush()
 }
 
-/// A line of CSV with its end: the fields with commas between them (RFC 4180). A field that contains a comma, a quote or the end of a line is
-/// quoted.
+/// Returns a CSV line (RFC 4180).
 pub fn csv_row(fields: impl IntoIterator<Item = impl AsRef<str>>) -> String {
     let mut line = String::new();
     for (i, field) in fields.into_iter().enumerate() {

@@ -1,8 +1,7 @@
-//! The dialect of a file: its separator and its decimal mark.
+//! Dialects of CSV files.
 //!
-//! A plain file has commas between fields and decimal points. Spreadsheets in many countries write semicolons and decimal commas instead. The
-//! first line determines the separator; the first number with a comma or a point determines the decimal mark. Both stay valid from there on: a
-//! stream is read by the same rules as a file. A text that no rule decides is refused.
+//! The first line determines the separator, the first number with a mark the decimal mark. Ambiguous text is
+//! an error.
 
 use std::fmt;
 
@@ -14,60 +13,58 @@ use super::marks::{Decimal, Separator};
 use super::zero_force::ZeroForce;
 use palpate_mechanics::units::Unit;
 
-/// Dialect of a file, as far as its lines determine it.
-///
-/// Displayed in a few words, such as `semicolons, decimal commas, units in the header`.
+/// Dialect of a file, displayed as in `semicolons, decimal commas, units in the header`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Dialect {
-    /// The name of the file.
+    /// File name.
     pub source: String,
-    /// Separator of the fields.
+    /// Field separator.
     pub separator: Separator,
-    /// Decimal mark; `None` while all numbers are whole.
+    /// Decimal mark; `None` for whole numbers.
     pub decimal: Option<Decimal>,
-    /// The number that determined the decimal mark, if its mark could also be a separator of thousands.
+    /// First number with a mark that may separate thousands.
     pub doubtful: Option<String>,
-    /// Whether columns were identified by their names without the units after them.
+    /// True if names matched without units.
     pub units_in_header: bool,
-    /// Whether some text was Windows-1252, not UTF-8.
+    /// True for Windows-1252.
     pub windows_1252: bool,
-    /// Number of rows that counted as untouched only because they have no position.
+    /// Rows untouched only by their missing position.
     #[serde(default)]
     pub without_position: usize,
-    /// Whether the text was UTF-16.
+    /// True for UTF-16.
     #[serde(default, skip_serializing_if = "is_false")]
     pub utf16: bool,
-    /// Lines above the heading that are not comments.
+    /// Lines above the heading.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub preamble: Option<Preamble>,
-    /// Line of the row of units below the heading.
+    /// Line of the units.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units_line: Option<usize>,
     /// Lines below the heading that are not rows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub notes: Option<Notes>,
-    /// Rows with a force that was recognised as 0, without a bound in the rig.
+    /// Forces recognised as 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub zero_force: Option<ZeroForce>,
 }
 
-/// Lines above the heading of a table.
+/// Lines above a heading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Preamble {
-    /// Number of lines.
+    /// Number.
     pub lines: usize,
-    /// Line of the heading.
+    /// Heading line.
     pub heading_line: usize,
 }
 
-/// Lines below the heading that are not rows: the name of a run, a total, the heading again.
+/// Lines below the heading that are not rows.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Notes {
-    /// Number of lines.
+    /// Number.
     pub lines: usize,
-    /// The first of them.
+    /// First line.
     pub first_line: usize,
-    /// Text of the first line, or its beginning.
+    /// Beginning of its text.
     pub text: String,
 }
 
@@ -78,12 +75,11 @@ fn is_false(value: &bool) -> bool {
 }
 
 impl Dialect {
-    /// The dialect of an unread file; `decimal` is the decimal mark in the rig.
     pub(super) fn new(source: &str, decimal: Option<Decimal>) -> Self {
         Self { source: source.to_owned(), decimal, ..Self::default() }
     }
 
-    /// True for plain CSV, which needs no remark.
+    /// True for plain CSV.
     pub fn is_plain(&self) -> bool {
         let plain = Self {
             source: self.source.clone(),
@@ -93,12 +89,10 @@ impl Dialect {
         *self == plain
     }
 
-    /// Records the number of `lines` above the heading.
     pub(super) fn note_preamble(&mut self, heading_line: usize, lines: usize) {
         self.preamble = (lines > 0).then_some(Preamble { lines, heading_line });
     }
 
-    /// Records a line that is not a row.
     pub(super) fn note_line(&mut self, line: usize, text: &str) {
         const MOST: usize = 40;
         let shown = || text.chars().map(|c| if c.is_control() { ' ' } else { c });
@@ -108,7 +102,7 @@ impl Dialect {
         self.notes.get_or_insert_with(first).lines += 1;
     }
 
-    /// The finite number in `text`, in SI units.
+    /// Finite number in SI units.
     pub(super) fn number(&mut self, text: &str, unit: Unit) -> Result<f64, CsvProblem> {
         let commas = text.bytes().filter(|byte| *byte == b',').count();
         let parsed = match commas {
@@ -135,7 +129,6 @@ impl Dialect {
         }
     }
 
-    /// Adopts the mark of a number as that of the file, or refuses a mark that differs from that of the file.
     fn see(&mut self, mark: Decimal, text: &str) -> Result<(), CsvProblem> {
         let doubtful = looks_grouped(text);
         match self.decimal {
@@ -144,13 +137,13 @@ impl Dialect {
             }
             Some(_) if doubtful => return Ok(()),
             Some(_) => {}
-            // Between commas, the comma of a quoted number may well separate thousands.
+            // Between commas, the comma of a quoted number may separate thousands.
             None if doubtful && mark == Decimal::Comma && self.separator == Separator::Comma => {
                 return Err(CsvProblem::DoubtfulNumber { text: text.to_owned() });
             }
             None => self.decimal = Some(mark),
         }
-        // A plain file has decimal points; beside semicolons, a point may separate thousands.
+        // Plain files have decimal points; with semicolons, a point may separate thousands.
         let doubtful = doubtful && (mark == Decimal::Comma || self.separator == Separator::Semicolon);
         self.doubtful = doubtful.then(|| text.to_owned());
         Ok(())
@@ -208,7 +201,7 @@ fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
-/// True for a text that is a number except for several points or commas.
+/// Number with several points or commas.
 fn has_thousands(text: &str) -> bool {
     let number: String = text.chars().filter(|c| !matches!(c, ',' | '.')).collect();
     let marks = text.len() - number.len();
@@ -221,7 +214,6 @@ fn has_thousands(text: &str) -> bool {
 mod tests {
     use super::*;
 
-    /// The numbers and the remarks on them, or the first error.
     fn said(separator: Separator, texts: &[&str]) -> String {
         let mut dialect = Dialect { separator, ..Dialect::default() };
         let numbers: Result<Vec<f64>, _> =

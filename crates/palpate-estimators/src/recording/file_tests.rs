@@ -1,10 +1,10 @@
-//! Files as loggers and spreadsheets write them.
+//! Tests with files of loggers and spreadsheets.
 
 use super::*;
 use palpate_mechanics::surface::Extent;
 use proptest::prelude::*;
 
-/// Presses of a strip with four channels; the other files have the same numbers.
+/// Four channels of a strip; the other files contain equal numbers.
 const BASE: &str = include_str!("../../tests/data/field/base.csv");
 const DUPLICATES: &[u8] = include_bytes!("../../tests/data/field/dup.csv");
 const UNITS_ROW: &[u8] = include_bytes!("../../tests/data/field/units-row.csv");
@@ -27,7 +27,6 @@ fn own() -> Columns {
     columns("position_mm", "force_n", ["S1", "S2", "S3", "S4"])
 }
 
-/// The recording and the remarks on its file.
 fn read_as(columns: &Columns, text: &[u8]) -> Result<(Recording, String), String> {
     let layout = Layout::even(SensorKind::Raw, 4, 0.1);
     let extent = Extent::line(0.1).unwrap();
@@ -41,14 +40,12 @@ fn said(columns: &Columns, text: &str) -> String {
     read_as(columns, text.as_bytes()).map_or_else(|error| error, |(_, said)| said)
 }
 
-/// The base recording with another heading and other separators, with `above` and `below` it.
 fn dressed(above: &str, heading: &str, separator: char, below: &str) -> String {
     let separated = |line: &str| line.replace(',', &separator.to_string()) + "\n";
     let rows: String = BASE.lines().skip(1).map(separated).collect();
     format!("{above}{}{rows}{below}", separated(heading))
 }
 
-/// The table with tabs as Windows writes Unicode text.
 fn utf16() -> Vec<u8> {
     let text = format!("\u{feff}{}", TABS.replace('\n', "\r\n"));
     text.encode_utf16().flat_map(u16::to_le_bytes).collect()
@@ -187,8 +184,7 @@ fn a_stream_finds_its_heading_and_loses_no_line_in_silence() {
     assert_eq!(refused, Some(199));
 }
 
-/// The remarks on the base recording with `force` of each row's force and number, and untouched rows at `place`. If any row is read as untouched,
-/// the untouched rows are those of the base recording.
+/// Remarks on the base recording with changed forces; asserts correct untouched rows, if any.
 fn with_forces(force: impl Fn(f64, usize) -> String, place: &str) -> String {
     let mut text = BASE.lines().next().unwrap().to_owned() + "\n";
     let mut expected = Vec::new();

@@ -1,10 +1,10 @@
-//! Decimal marks that may be separators of thousands: `1.003` beside `503`.
+//! Separators of thousands among decimal marks: `1.003` beside `503`.
 
 use super::csv_error::{CsvError, CsvProblem};
 use super::marks::Decimal;
 use std::ops::Range;
 
-/// Whether a number with one mark, a point or a comma, may be a whole number with a separator of thousands: `1,234`, not `0,234`.
+/// One mark that may separate thousands: `1,234`, not `0,234`.
 pub(super) fn looks_grouped(number: &str) -> bool {
     let digits = number.trim_start_matches(['+', '-']);
     let all_digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
@@ -17,50 +17,42 @@ pub(super) fn looks_grouped(number: &str) -> bool {
     })
 }
 
-/// Numbers of a file's columns with marks that may separate thousands.
+/// Columns with marks that may separate thousands.
 ///
-/// One number that can only have a decimal mark, such as `0.5`, decides for its column. Without such a number, the marks of a column are ambiguous
-/// under two conditions: numbers with a mark stand beside whole numbers below 1000, and all of them span no more decades as thousands than as
-/// decimals.
+/// A number that can only have a decimal mark, such as `0.5`, decides for its column. Otherwise the column is
+/// ambiguous if it has whole numbers below 1000 and spans no more decades as thousands than as decimals.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Groupings {
-    /// Whether the decimal mark is given, so that no number is ambiguous.
     is_said: bool,
     columns: Vec<Grouping>,
 }
 
-/// The numbers of one column.
 #[derive(Clone, Debug, Default)]
 struct Grouping {
     is_decided: bool,
-    /// Whole numbers without a mark, other than 0: the least and the greatest magnitude, and the text of the greatest.
+    /// Unmarked numbers: least and greatest magnitude, text of the greatest.
     whole: Option<(f64, f64, String)>,
-    /// Numbers that look grouped: the least and the greatest magnitude as decimals, and the place of the first number.
+    /// Grouped numbers: least and greatest magnitude as decimals, place of the first.
     grouped: Option<(f64, f64, Place)>,
 }
 
-/// Place of a number.
 #[derive(Clone, Debug)]
 pub(super) struct Place {
     pub line: usize,
     pub column: usize,
-    /// Text of the line, and the number's bytes in it.
     pub text: String,
     pub span: Range<usize>,
 }
 
 impl Groupings {
-    /// Groupings of a file; never ambiguous if its decimal mark is given.
     pub fn new(decimal: Option<Decimal>) -> Self {
         Self { is_said: decimal.is_some(), columns: Vec::new() }
     }
 
-    /// True where no further number of a column can be ambiguous.
     pub fn is_decided(&self, column: usize) -> bool {
         self.is_said || self.columns.get(column).is_some_and(|column| column.is_decided)
     }
 
-    /// Adds the number `text` of a column.
     pub fn insert(&mut self, column: usize, text: &str, place: impl FnOnce() -> Place) {
         if self.columns.len() <= column {
             self.columns.resize(column + 1, Grouping::default());
@@ -88,7 +80,7 @@ impl Groupings {
         }
     }
 
-    /// The error of the first ambiguous column.
+    /// Error of the first ambiguous column.
     pub fn doubt(&self, source: &str) -> Option<CsvError> {
         if self.is_said {
             return None;
@@ -96,7 +88,6 @@ impl Groupings {
         self.columns.iter().find_map(|column| column.doubt(source))
     }
 
-    /// The error of this column, if it is ambiguous.
     pub fn doubt_in(&self, column: usize, source: &str) -> Option<CsvError> {
         self.columns.get(column).filter(|_| !self.is_said)?.doubt(source)
     }

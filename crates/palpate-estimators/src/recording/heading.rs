@@ -1,19 +1,19 @@
-//! Names of columns and the units after them.
+//! Column headings.
 
 use palpate_mechanics::units::Unit;
 
-/// A column's name and its unit: `Position [mm]`, `Kraft (N)`, `X / mm`, `Kraft in N`, `Force, N`.
+/// Name and unit of a column: `Position [mm]`, `Kraft (N)`, `X / mm`, `Kraft in N`, `Force, N`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Heading<'a> {
-    /// The name without the unit.
+    /// Bare name.
     pub name: &'a str,
-    /// Text in the place of the unit.
+    /// Unit text.
     pub unit: Option<&'a str>,
 }
 
 impl<'a> Heading<'a> {
-    /// The parts of a heading. Text in brackets or parentheses, or a single word after a slash between spaces, is always the unit. Text after a
-    /// bare slash, a comma or `in` is the unit only if it is the symbol of one.
+    /// Splits a heading. Text in brackets, parentheses or after ` / ` is the unit; after `/`, `,` or `in`
+    /// only a known symbol is.
     pub fn parse(text: &'a str) -> Self {
         let text = text.trim();
         let parts = Self::enclosed(text, '[', ']').or_else(|| Self::enclosed(text, '(', ')'));
@@ -30,7 +30,7 @@ impl<'a> Heading<'a> {
         }
     }
 
-    /// The unit, if palpate defines its symbol.
+    /// Unit, if known.
     pub fn known_unit(&self) -> Option<Unit> {
         self.unit.and_then(Unit::from_symbol)
     }

@@ -1,4 +1,4 @@
-//! Sequential reading of lines of CSV: the search for the heading, then one row after another.
+//! Sequential CSV reader.
 
 use super::cells::{Cells, split};
 use super::columns::{Column, Columns, Header, PositionColumns};
@@ -9,24 +9,21 @@ use super::marks::{Decimal, Separator};
 use super::notes::{self, LineKind, Origin};
 use super::text::windows_1252;
 
-/// Greatest number of lines that are searched for a heading. Preambles of loggers have 20 to 60.
+/// Preambles of loggers have 20 to 60 lines.
 const MOST_PREAMBLE: usize = 200;
 
-/// Rules by which lines are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Reading {
     pub header: Header,
     pub separator: Option<Separator>,
     pub decimal: Option<Decimal>,
-    /// Whether some column is given by its name, so that a line with all columns must be the heading.
+    /// True if a line with all columns must be the heading.
     pub has_names: bool,
-    /// Least number of fields of a row.
     pub least_width: usize,
     pub origin: Origin,
 }
 
 impl Reading {
-    /// Rules for lines with these columns.
     pub fn of(columns: &Columns, origin: Origin) -> Self {
         let positions = match &columns.position {
             PositionColumns::Along(x) => vec![x],
@@ -39,33 +36,29 @@ impl Reading {
     }
 }
 
-/// Sequential reader of lines of CSV.
 #[derive(Debug)]
 pub(super) struct Lines<F> {
-    /// Dialect of the lines so far.
     dialect: Dialect,
     groupings: Groupings,
     reading: Reading,
-    /// The text of the last line that was not UTF-8.
+    /// Last line that was not UTF-8.
     decoded: String,
-    /// Number of lines that have been read.
     count: usize,
     search: Search<F>,
     body: Option<Body<F>>,
 }
 
-/// The search for the heading.
 #[derive(Debug)]
 struct Search<F> {
-    /// Number of lines with a text that are not the heading.
+    /// Non-blank lines above the heading.
     skipped: usize,
-    /// The last line that has all columns by their numbers, and may be the heading, with its line number.
+    /// Last line with all columns by number, with its line number.
     candidate: Option<(Head<F>, usize)>,
-    /// The error of the line that looks most like the heading, with its likeness.
+    /// Error of the line most similar to a heading, with its likeness.
     refused: Option<(usize, CsvError)>,
 }
 
-/// A heading, or the first row of a table without one.
+/// Heading, or first row without a heading.
 #[derive(Clone, Debug)]
 struct Head<F> {
     fields: F,
@@ -73,20 +66,16 @@ struct Head<F> {
     texts: Vec<String>,
 }
 
-/// The table below its heading.
 #[derive(Clone, Debug)]
 struct Body<F> {
     fields: F,
-    /// Texts of the heading, or of the first row.
     heading: Vec<String>,
-    /// Texts of the row of units.
     units: Option<Vec<String>>,
-    /// The columns that have words in the last row; `None` before the first row.
+    /// Columns with words in the last row.
     words: Option<Vec<bool>>,
 }
 
 impl<F> Lines<F> {
-    /// A reader of the lines of `source` from the first one.
     pub fn new(source: &str, reading: Reading) -> Self {
         Self {
             dialect: Dialect::new(source, reading.decimal),
@@ -99,8 +88,7 @@ impl<F> Lines<F> {
         }
     }
 
-    /// The cells of the next line and the fields that `find` determined from the heading; `None` for a line that is not a row. Such lines are the
-    /// heading and lines above it, units, blank lines, comments (`#`), and in files notes below the table.
+    /// Next row; `None` for preamble, heading, units, blank lines, comments, and notes in files.
     pub fn next<'a>(
         &'a mut self,
         line: &'a [u8],
@@ -127,13 +115,13 @@ impl<F> Lines<F> {
         Ok(is_row.then_some((cells, &body.fields)))
     }
 
-    /// The error of the line that looks most like the heading, if no line was a heading.
+    /// Error of the line most similar to a heading.
     pub fn unfound(&mut self) -> Option<CsvError> {
         let refused = self.search.refused.take().filter(|_| self.body.is_none());
         refused.map(|(_, error)| error)
     }
 
-    /// Dialect of the lines, or the error of the first column with decimal marks that may separate thousands.
+    /// Error for a column with ambiguous separators of thousands.
     pub fn into_dialect(self) -> Result<Dialect, CsvError> {
         match self.groupings.doubt(&self.dialect.source) {
             Some(error) => Err(error),
@@ -141,12 +129,10 @@ impl<F> Lines<F> {
         }
     }
 
-    /// The fields of the heading, after it was read.
     pub fn fields(&self) -> Option<&F> {
         self.body.as_ref().map(|body| &body.fields)
     }
 
-    /// Texts of the row of units, where there is one.
     pub fn units(&self) -> Option<&[String]> {
         self.body.as_ref()?.units.as_deref()
     }
@@ -154,16 +140,17 @@ impl<F> Lines<F> {
 
 /// Progress of a [`LineParser`](super::LineParser).
 pub trait LineProgress {
-    /// Counts a line that is not read, so that the following lines have correct numbers.
+    /// Counts a skipped line.
     fn skip_line(&mut self);
 
-    /// True as long as no line has determined the columns. An error in this state means that no line can be read.
+    /// True until a line determines the columns; an error then prevents all reading.
     fn awaits_columns(&self) -> bool;
 
-    /// Dialect of the lines so far.
+    /// Current dialect.
     fn dialect(&self) -> &Dialect;
 
-    /// The error of the line that looks most like the heading, for use after the last line, if no line was a heading.
+    /// Returns the error of the line most similar to a heading if none was found; for use after the last
+    /// line.
     fn unfound(&mut self) -> Option<CsvError>;
 }
 
@@ -185,7 +172,6 @@ impl<F> LineProgress for Lines<F> {
     }
 }
 
-/// Role of the line at which a table is detected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Role {
     Heading,
@@ -193,7 +179,7 @@ enum Role {
 }
 
 impl<F> Search<F> {
-    /// The table that begins with this line or with the heading above it; `None` as long as the search continues.
+    /// Table that begins with this line or the heading above it.
     fn next(
         &mut self,
         line: usize,
@@ -243,7 +229,7 @@ impl<F> Search<F> {
 }
 
 impl<F> Head<F> {
-    /// The head that `find` determines from a line, with the one separator for which it succeeds; `None` for a line of empty fields.
+    /// Head by the only separator that succeeds; `None` for empty fields.
     fn find(
         line: usize,
         text: &str,
@@ -283,14 +269,13 @@ impl<F> Head<F> {
         }
     }
 
-    /// The table below this head. Sets the separator and `units_in_header` of `dialect` to those of the head.
     fn accept(self, dialect: &mut Dialect) -> Body<F> {
         dialect.separator = self.dialect.separator;
         dialect.units_in_header = self.dialect.units_in_header;
         Body { fields: self.fields, heading: self.texts, units: None, words: None }
     }
 
-    /// True for a line that looks like a heading where columns are given by their numbers: words in most fields, not all the same.
+    /// Distinct words in most fields.
     fn is_heading(&self) -> bool {
         let texts: Vec<&str> = self.texts.iter().map(String::as_str).collect();
         let words = notes::distinct_words(&texts);
@@ -301,7 +286,7 @@ impl<F> Head<F> {
 }
 
 impl<F> Body<F> {
-    /// True where a line that is not blank is a row. Units and notes are recorded in the dialect.
+    /// Records units and notes in the dialect.
     fn is_row(
         &mut self,
         cells: &mut Cells,
@@ -341,7 +326,6 @@ impl<F> Body<F> {
         }
     }
 
-    /// Refuses a row of units if one is not the unit in which its column is read.
     fn check_units(
         &self,
         cells: &Cells,
@@ -360,12 +344,11 @@ impl<F> Body<F> {
     }
 }
 
-/// Candidate separators of the first line of a table.
 fn separators(text: &str, header: Header) -> Vec<Separator> {
     let width = |separator: Separator| split(text, separator).map_or(0, |fields| fields.len());
     let mut separators: Vec<Separator> =
         Separator::MARKS.into_iter().filter(|separator| width(*separator) > 1).collect();
-    // Between numbers, a comma beside another separator stands before decimals.
+    // Between numbers, a comma beside another separator is a decimal mark.
     if header == Header::Absent {
         let blanks = Some(Separator::Blanks).filter(|blanks| width(*blanks) > 1);
         let is_cut_better = |blanks: &Separator| {
@@ -385,13 +368,12 @@ fn separators(text: &str, header: Header) -> Vec<Separator> {
     }
 }
 
-/// Number of fields that are not values.
 pub(super) fn words_among(text: &str, separator: Separator) -> usize {
     let fields = split(text, separator).unwrap_or_default();
     fields.iter().filter(|field| !notes::is_value(&field.value)).count()
 }
 
-/// True for a line with at least `least_width` fields, all of them values or empty, and at least one a value.
+/// Values or empty fields, at least one a value.
 pub(super) fn is_row_of_values(text: &str, separator: Separator, least_width: usize) -> bool {
     let Ok(fields) = split(text, separator) else { return false };
     let mut texts =
@@ -399,7 +381,7 @@ pub(super) fn is_row_of_values(text: &str, separator: Separator, least_width: us
     fields.len() >= least_width && texts.peek().is_some() && texts.all(notes::is_value)
 }
 
-/// Text of a line of bytes, without its end; `None` for a blank line or a comment. `decoded` contains the text of a line that is not UTF-8.
+/// `None` for a blank line or a comment; `decoded` stores text that is not UTF-8.
 pub(super) fn written<'a>(
     bytes: &'a [u8],
     line: usize,
@@ -424,7 +406,7 @@ pub(super) fn written<'a>(
     let text = text.trim_end_matches(['\r', '\n']);
     // Some spreadsheets begin a file with a byte-order mark.
     let text = if line == 1 { text.strip_prefix('\u{feff}').unwrap_or(text) } else { text };
-    // A heading may be `#`, for the number of the row.
+    // A heading may be `#`, for the row number.
     let is_comment = text.strip_prefix('#').is_some_and(|rest| !rest.starts_with([',', ';', '\t', '|']));
     Ok(Some(text).filter(|text| !text.trim().is_empty() && !is_comment))
 }

@@ -1,10 +1,10 @@
-//! Separators of fields, and decimal marks.
+//! Separators and decimal marks.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// Separator of the fields of a line.
+/// Field separator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Separator {
@@ -13,11 +13,11 @@ pub enum Separator {
     Comma,
     /// `a;b`
     Semicolon,
-    /// A tabulator.
+    /// Tabulator.
     Tab,
     /// `a|b`
     Pipe,
-    /// One blank or several: fields cannot be empty.
+    /// Runs of blanks.
     Blanks,
 }
 
@@ -25,10 +25,9 @@ impl Separator {
     /// All separators.
     pub const ALL: [Self; 5] = [Self::Comma, Self::Semicolon, Self::Tab, Self::Pipe, Self::Blanks];
 
-    /// Separators that are one character each.
     pub(super) const MARKS: [Self; 4] = [Self::Comma, Self::Semicolon, Self::Tab, Self::Pipe];
 
-    /// The name in rigs.
+    /// Name in rigs.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Comma => "comma",
@@ -39,7 +38,7 @@ impl Separator {
         }
     }
 
-    /// The character.
+    /// Character.
     pub const fn byte(self) -> u8 {
         match self {
             Self::Comma => b',',
@@ -50,7 +49,7 @@ impl Separator {
         }
     }
 
-    /// The separator in a line `sep=;`, by which some spreadsheets begin a file.
+    /// Parses `sep=;`, by which some spreadsheets begin a file.
     pub(super) fn from_declaration(line: &str) -> Option<Self> {
         let mark = line.trim_matches([' ', '"']).strip_prefix("sep=")?;
         Self::MARKS.into_iter().find(|separator| mark.as_bytes() == [separator.byte()])
@@ -69,7 +68,7 @@ impl fmt::Display for Separator {
     }
 }
 
-/// Decimal mark of a number.
+/// Decimal mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Decimal {
@@ -83,7 +82,7 @@ impl Decimal {
     /// Both decimal marks.
     pub const ALL: [Self; 2] = [Self::Point, Self::Comma];
 
-    /// The name in rigs.
+    /// Name in rigs.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Point => "point",

@@ -1,4 +1,4 @@
-//! Readings paired with their contacts: the data that calibration records and evaluation requires.
+//! Recordings: readings with their contacts.
 
 mod cells;
 mod columns;
@@ -56,17 +56,18 @@ use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_numerics::{mean, random_order};
 use std::borrow::Cow;
 
-/// Degrees of freedom of a channel's noise that count as those of its prior. A noise estimate with no more degrees of freedom is unreliable.
+/// Degrees of freedom up to which a noise estimate is unreliable; the prior of a channel's noise counts as
+/// many.
 pub(crate) const LEAST_FREEDOM: f64 = 4.0;
 
-/// Readings with the contacts that caused them.
+/// Readings with their contacts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
-    /// The name of each channel, in the order of the readings' values.
+    /// Channel names.
     pub channels: Vec<String>,
     /// Quantity that each channel measures.
     pub kinds: Vec<SensorKind>,
-    /// The rows, in the order in which they were recorded.
+    /// Rows in the order of recording.
     pub rows: Vec<Row>,
     /// Provenance of the rows.
     pub provenance: Provenance,
@@ -75,83 +76,82 @@ pub struct Recording {
 /// One reading and its contact.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// True position of the contact.
+    /// True position.
     pub position: Position,
-    /// Force in newtons, positive downward; `None` if it was not measured, 0 for an untouched row.
+    /// Force in newtons, positive downward; `None` if unmeasured, 0 if untouched.
     pub force_n: Option<f64>,
-    /// Coordinates that affect the reading, for example the depth of indentation and the temperature. They are known here and unknown when a
-    /// reading is located. In the SI units of their columns and in their order; empty where the recording has no such columns.
+    /// Known coordinates that affect the reading, such as temperature, in SI units; unknown when a reading is
+    /// located.
     pub nuisances: Vec<f64>,
-    /// Time in seconds, if the recording has one: from the origin of the file's times, or since the first row for timestamps.
+    /// Time in seconds, for timestamps since the first row.
     pub time_s: Option<f64>,
-    /// One finite value per channel, in the SI unit of its kind (or raw).
+    /// One finite value per channel, in SI units or raw.
     pub reading: Vec<f64>,
 }
 
 impl Row {
-    /// The contact, where its force is known.
+    /// Returns the contact; `None` without force.
     pub fn contact(&self) -> Option<Contact> {
         self.force_n.map(|force_n| Contact { position: self.position, force_n })
     }
 
-    /// True for a contact: the force is not 0. The position of a row without contact has no meaning.
+    /// True unless the force is 0, where the position has no meaning.
     pub fn touches(&self) -> bool {
         self.force_n != Some(0.0)
     }
 }
 
-/// The SHA-256 of a file's content in hexadecimal, by which provenance names it.
+/// Returns the SHA-256 of a file's content in hexadecimal.
 pub fn sha256_hex(content: &[u8]) -> String {
     Sha256::digest(content).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Provenance of a recording. Every model that is fitted to the recording can state it.
+/// Provenance of a recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
-    /// The name that the caller gave: usually a file's, or "simulation".
+    /// Name of the file, or "simulation".
     pub source: String,
     /// Number of rows.
     pub rows: usize,
-    /// The [`sha256_hex`] of each file that was read; empty for a simulation.
+    /// [`sha256_hex`] of each file; empty for a simulation.
     pub digests: Vec<String>,
-    /// Dialect of each file, where it is not plain CSV.
+    /// Dialects of files that are not plain CSV.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub dialects: Vec<Dialect>,
-    /// Rows that repeated the reading before them, and slow channels, where there are some.
+    /// Repeated rows and slow channels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub repeats: Option<Repeats>,
-    /// The seed of a simulation.
+    /// Seed of a simulation.
     pub seed: Option<u64>,
-    /// Standard deviation in each direction of the pressed place about the position of its row, in metres, if a person pressed and the file states
-    /// it.
+    /// Standard deviation of manual placement in each direction, in metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub placement_sd_m: Option<f64>,
-    /// State in which the recording left a simulated bench with imperfections.
+    /// Final state of a simulated bench.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bench: Option<BenchState>,
 }
 
-/// One fold of held-out positions: the rows to fit and the rows to evaluate.
+/// Fold of cross-validation by position.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fold {
-    /// Indices of the rows to fit.
+    /// Rows to fit.
     pub training: Vec<usize>,
-    /// Indices of the rows at held-out positions.
+    /// Rows at held-out positions.
     pub held_out: Vec<usize>,
 }
 
-/// A recording has fewer distinct positions than are needed.
+/// Too few distinct positions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the recording has {found} distinct positions; at least {needed} are needed")]
 pub struct TooFewPositions {
-    /// Number of distinct positions that it has.
+    /// Number of positions.
     pub found: usize,
-    /// Number that is needed.
+    /// Required number.
     pub needed: usize,
 }
 
 impl Recording {
-    /// A recording by the sensors of a layout, from a source of this name, without files or a seed.
+    /// Creates a recording without files or seed.
     pub fn new(layout: &Layout, source: &str, rows: Vec<Row>) -> Self {
         let provenance = Provenance {
             source: source.to_owned(),
@@ -166,24 +166,24 @@ impl Recording {
         Self { channels: layout.names(), kinds: layout.kinds(), rows, provenance }
     }
 
-    /// Sets the seed of the simulation.
+    /// Sets the seed.
     #[must_use]
     pub fn seeded(mut self, seed: u64) -> Self {
         self.provenance.seed = Some(seed);
         self
     }
 
-    /// The time of every row, in seconds; `None` where some row has none.
+    /// Returns the times in seconds; `None` if some row has none.
     pub fn times_s(&self) -> Option<Vec<f64>> {
         self.rows.iter().map(|row| row.time_s).collect()
     }
 
-    /// The time of every row in seconds, or its number where some row has none.
+    /// Times in seconds, or row numbers if some row has none.
     pub(crate) fn times_or_order(&self) -> Vec<f64> {
         self.times_s().unwrap_or_else(|| (0..self.rows.len()).map(|row| row as f64).collect())
     }
 
-    /// Sets the time of each row to its number if some row has no time, so that parts of the recording keep their order.
+    /// Sets times to row numbers if some row has none, so that subsets keep their order.
     #[must_use]
     pub fn in_order(mut self) -> Self {
         if self.times_s().is_none() {
@@ -192,7 +192,7 @@ impl Recording {
         self
     }
 
-    /// Every touched position, once, sorted by x and then y.
+    /// Returns the touched positions, sorted by x, then y.
     pub fn distinct_positions(&self) -> Vec<Position> {
         let touched = self.rows.iter().filter(|row| row.touches());
         let mut positions: Vec<Position> = touched.map(|row| row.position).collect();
@@ -201,23 +201,23 @@ impl Recording {
         positions
     }
 
-    /// True where every row has a force, but too few rows repeat a place or are untouched to estimate the noise of influence functions.
+    /// True if every row has a force, but repeats are too few for a reliable noise estimate.
     pub fn hardly_tells_noise(&self) -> bool {
         let spare = self.rows.len().saturating_sub(self.distinct_positions().len() + 1);
         self.rows.iter().all(|row| row.force_n.is_some()) && spare as f64 <= LEAST_FREEDOM
     }
 
-    /// Checks that there are at least `needed` distinct positions.
+    /// Checks the number of distinct positions.
     ///
     /// # Errors
-    /// [`TooFewPositions`], with both numbers.
+    /// [`TooFewPositions`].
     pub fn check_distinct_positions(&self, needed: usize) -> Result<(), TooFewPositions> {
         let found = self.distinct_positions().len();
         if found >= needed { Ok(()) } else { Err(TooFewPositions { found, needed }) }
     }
 
-    /// Splits the rows into `count` folds by position. Fold k holds out every distinct position with index i such that i mod `count` = k, with all
-    /// rows of the position. The positions are sorted by x and then y. No fold holds out rows without contact.
+    /// Splits the rows into folds, at least 2: fold k holds out positions i with i mod `count` = k, sorted by
+    /// x, then y. Untouched rows are in every training set.
     ///
     /// ```
     /// use palpate_estimators::{arrangement::Training, setup::Setup};
@@ -231,8 +231,7 @@ impl Recording {
     /// ```
     ///
     /// # Errors
-    /// [`TooFewPositions`] when there are fewer distinct positions than folds, or fewer than 2, since every fold
-    /// needs rows to fit; a `count` below 2 counts as 2.
+    /// [`TooFewPositions`].
     pub fn folds(&self, count: usize) -> Result<Vec<Fold>, TooFewPositions> {
         let count = count.max(2);
         self.check_distinct_positions(count)?;
@@ -248,7 +247,7 @@ impl Recording {
         Ok(folds)
     }
 
-    /// The rows with a contact, with the same provenance; borrowed if all rows have one.
+    /// Returns the touched rows.
     pub fn touched(&self) -> Cow<'_, Self> {
         if self.rows.iter().all(Row::touches) {
             return Cow::Borrowed(self);
@@ -262,19 +261,19 @@ impl Recording {
         })
     }
 
-    /// Mean reading of the untouched rows; `None` without such rows.
+    /// Returns the mean untouched reading.
     pub fn untouched_mean(&self) -> Option<Vec<f64>> {
         let untouched: Vec<usize> = (0..self.rows.len()).filter(|row| !self.rows[*row].touches()).collect();
         (!untouched.is_empty()).then(|| self.mean_reading(&untouched))
     }
 
-    /// Mean reading of some rows, by their indices.
+    /// Returns the mean reading of some rows.
     pub fn mean_reading(&self, rows: &[usize]) -> Vec<f64> {
         let channel = |c: usize| mean(rows.iter().map(|row| self.rows[*row].reading[c]));
         (0..self.channels.len()).map(channel).collect()
     }
 
-    /// Rests: runs of consecutive untouched rows, by their indices.
+    /// Returns runs of consecutive untouched rows.
     pub fn rests(&self) -> Vec<Vec<usize>> {
         let indices: Vec<usize> = (0..self.rows.len()).collect();
         let touches = |row: &usize| self.rows[*row].touches();
@@ -282,8 +281,8 @@ impl Recording {
         runs.filter(|run| !touches(&run[0])).map(<[usize]>::to_vec).collect()
     }
 
-    /// One row of each touched position, drawn at random, because presses of a position may be in the order of their depths; `None` if those are
-    /// all rows.
+    /// Draws one row of each touched position, at random because rows may be ordered by depth; `None` if that
+    /// is every row.
     pub fn one_row_a_position(&self, seed: u64) -> Option<Self> {
         let positions = self.distinct_positions();
         let mut drawn: Vec<Option<usize>> = vec![None; positions.len()];
@@ -299,7 +298,7 @@ impl Recording {
         (drawn.len() < self.rows.len()).then(|| self.subset(&drawn))
     }
 
-    /// The recording of the rows with the indices `rows`; indices beyond the last row are ignored.
+    /// Returns the recording of some rows; ignores indices beyond the last.
     pub fn subset(&self, rows: &[usize]) -> Self {
         let rows: Vec<Row> = rows.iter().filter_map(|i| self.rows.get(*i)).cloned().collect();
         let provenance = Provenance { rows: rows.len(), ..self.provenance.clone() };

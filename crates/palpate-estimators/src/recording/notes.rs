@@ -1,34 +1,32 @@
-//! Lines of a table that are not rows: units, totals, remarks.
+//! Lines that are not rows: units, totals, notes.
 
 use super::cells::split;
 use super::heading::Heading;
 use super::marks::Separator;
 use palpate_mechanics::units::Unit;
 
-/// Origin of lines. In a file, a line below the table may be a note of its author; in a stream it is a lost reading.
+/// An unreadable line is a note in a file, but a lost reading in a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Origin {
     File,
     Stream,
 }
 
-/// Kind of a line below the heading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum LineKind {
     Row,
-    /// Units of the columns.
     Units,
-    /// A line without a reading: the heading again, a total, the name of a run.
+    /// Repeated heading, total, name of a run.
     Note,
 }
 
-/// Texts for a missing value: a line that contains one is a row.
+/// Missing values; their lines are rows.
 const MISSING: [&str; 16] = [
     "nan", "na", "n/a", "#n/a", "null", "none", "inf", "-inf", "+inf", "infinity", "err", "error", "ol",
     "ovld", "overload", "overflow",
 ];
 
-/// Names of rows that spreadsheets compute from the others.
+/// Computed rows of spreadsheets.
 const TOTALS: [&str; 26] = [
     "total",
     "totals",
@@ -58,14 +56,14 @@ const TOTALS: [&str; 26] = [
     "ø",
 ];
 
-/// Units that loggers write and palpate does not convert.
+/// Units without conversion.
 const OTHER_UNITS: [&str; 26] = [
     "v", "mv", "µv", "uv", "a", "ma", "ohm", "ω", "kω", "w", "hz", "°c", "degc", "c", "k", "%", "counts",
     "count", "cts", "digits", "digit", "lsb", "raw", "a.u.", "au", "bit",
 ];
 
-/// Kind of a line below a heading with these fields, at least one of them not a value. `words` marks the columns with words in the last row;
-/// `None` before the first row.
+/// Classifies a line with at least one field that is not a value. `words` marks columns with words in the
+/// last row.
 pub(super) fn kind_of(
     texts: &[&str],
     heading: &[String],
@@ -105,7 +103,6 @@ pub(super) fn kind_of(
     if is_note { LineKind::Note } else { LineKind::Row }
 }
 
-/// The headings, with units from the row below for headings without a unit.
 pub(super) fn with_units(heading: &[String], units: &[String]) -> Vec<String> {
     let bare = |unit: &str| unit.trim_matches(['[', ']', '(', ')']).trim().to_owned();
     let composed = heading.iter().enumerate().map(|(i, heading)| {
@@ -120,7 +117,7 @@ pub(super) fn with_units(heading: &[String], units: &[String]) -> Vec<String> {
     composed.collect()
 }
 
-/// Likeness of a line to a heading: the number of its distinct words; 0 for a row of units.
+/// Number of distinct words; 0 for units.
 pub(super) fn heading_likeness(text: &str, separator: Separator) -> usize {
     let fields = split(text, separator).unwrap_or_default();
     let texts: Vec<&str> = fields.iter().map(|field| field.value.as_ref()).collect();
@@ -128,7 +125,7 @@ pub(super) fn heading_likeness(text: &str, separator: Separator) -> usize {
     if is_units { 0 } else { distinct_words(&texts) }
 }
 
-/// Number of distinct texts that are not empty and do not begin like a value.
+/// Distinct non-empty texts that do not begin like a value.
 pub(super) fn distinct_words(texts: &[&str]) -> usize {
     let mut words: Vec<&str> =
         texts.iter().copied().filter(|text| !text.is_empty() && !begins_like_a_value(text)).collect();
@@ -137,19 +134,17 @@ pub(super) fn distinct_words(texts: &[&str]) -> usize {
     words.len()
 }
 
-/// Whether a text is a number with either decimal mark, or looks like a timestamp.
+/// Number or timestamp.
 pub(super) fn is_value(text: &str) -> bool {
     begins_like_a_value(text)
         && (Unit::NONE.parse_si(&text.replacen(',', ".", 1)).is_some() || text.contains(':'))
 }
 
-/// Whether a text begins as a number or a timestamp does.
 pub(super) fn begins_like_a_value(text: &str) -> bool {
     let unsigned = text.strip_prefix(['+', '-']).unwrap_or(text);
     unsigned.strip_prefix(['.', ',']).unwrap_or(unsigned).starts_with(|c: char| c.is_ascii_digit())
 }
 
-/// True for a text that may be a unit in a row of units.
 fn is_unit(text: &str) -> bool {
     let is_enclosed = |open, close| text.starts_with(open) && text.ends_with(close);
     let known = |text: &str| Unit::from_symbol(text).is_some_and(|unit| unit != Unit::NONE);

@@ -1,23 +1,18 @@
-//! Placement: the distance of a person's press from the requested place.
-//!
-//! The comment of a recording of presses contains the placement, so that every fit to the recording can use it.
+//! Placement error of manual presses, stored in a comment.
 
 use palpate_mechanics::units::{Dimension, Quantity};
 
-/// Text before the placement in a comment.
 const PART: &str = "; placement ";
 
-/// A comment of a recording with its placement: the standard deviation of the distance between pressed and requested place in each direction, in
-/// metres.
+/// Appends the placement standard deviation in each direction, in metres.
 pub fn comment_with_placement(comment: &str, placement_sd_m: Option<f64>) -> String {
     match placement_sd_m {
-        // Digits below a picometre are rounding.
+        // Round to picometres.
         Some(sd_m) => format!("{comment}{PART}{} mm", (sd_m * 1e12).round() / 1e9),
         None => comment.to_owned(),
     }
 }
 
-/// Placement in the comment on the first line of a file, in metres.
 pub(super) fn placement_of(content: &[u8]) -> Option<f64> {
     let line = content.split(|byte| *byte == b'\n').next()?;
     let (_, text) = std::str::from_utf8(line).ok()?.strip_prefix('#')?.rsplit_once(PART)?;

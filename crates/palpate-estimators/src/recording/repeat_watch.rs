@@ -1,11 +1,11 @@
-//! Repeated readings in a stream.
+//! Sample-and-hold detection in a stream.
 
 use super::sample_hold::{RepeatCause, RepeatCounts, is_same_reading};
 
-/// Pairs of untouched readings between two tests.
+/// Pairs between two tests.
 const PAIRS_EACH: u64 = 32;
 
-/// Detector of a source that is faster than its sensors, for a stream of readings.
+/// Detector of a source faster than its sensors.
 ///
 /// ```
 /// use palpate_estimators::recording::RepeatWatch;
@@ -26,14 +26,13 @@ pub struct RepeatWatch {
 }
 
 impl RepeatWatch {
-    /// A watch over this number of channels.
+    /// Creates a detector.
     pub fn new(channels: usize) -> Self {
         Self { counts: RepeatCounts::new(channels), last: Vec::new(), tested: 0, is_sample_and_hold: false }
     }
 
-    /// Adds the next reading. True for a repeat of the reading before it under sample and hold, which contains no new measurement.
-    ///
-    /// Only readings at rest, with `at_rest` true, decide about the source: a touch changes all channels together in any source.
+    /// Adds the next reading; true for a repeat under sample and hold. Only readings at rest are tested,
+    /// because a touch changes all channels together.
     pub fn add(&mut self, reading: &[f64], at_rest: bool) -> bool {
         if at_rest && !self.last.is_empty() && !self.is_sample_and_hold {
             self.counts.add(&self.last, reading);
@@ -50,7 +49,7 @@ impl RepeatWatch {
         repeats && self.is_sample_and_hold
     }
 
-    /// True where the source is faster than its sensors.
+    /// True if sample and hold was detected.
     pub fn is_sample_and_hold(&self) -> bool {
         self.is_sample_and_hold
     }

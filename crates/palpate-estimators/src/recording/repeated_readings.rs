@@ -1,4 +1,4 @@
-//! Treatment of readings that repeat the reading before them in every channel.
+//! Treatment of repeated readings.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,44 +6,44 @@ use super::sample_hold::{RepeatCause, RepeatCounts, is_same_reading};
 use super::{Recording, Row};
 use palpate_numerics::median;
 
-/// Treatment of rows that repeat the reading before them in every channel.
+/// Treatment of repeats in every channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RepeatedReadings {
-    /// Each run of them counts once where chance does not explain the repeats.
+    /// Collapses runs that chance does not explain.
     #[default]
     Auto,
-    /// Each run of them counts once, for any cause.
+    /// Collapses every run.
     Collapse,
-    /// Each row counts.
+    /// Keeps every row.
     Keep,
 }
 
 impl RepeatedReadings {
-    /// True for the default treatment.
+    /// True by default.
     pub fn is_auto(&self) -> bool {
         *self == Self::Auto
     }
 }
 
-/// Repeats in a recording, as its file has them.
+/// Repeats in a file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Repeats {
-    /// Rows that were left out, each a repeat of the row before it.
+    /// Removed rows.
     pub left_out: usize,
-    /// Rows of the file.
+    /// Rows in the file.
     pub of: usize,
-    /// True where the logger is faster than its sensors.
+    /// True for a logger faster than its sensors.
     pub sample_and_hold: bool,
-    /// Channels that repeat their value while others change, slower than the logger.
+    /// Channels slower than the logger.
     pub slow_channels: Vec<String>,
 }
 
 impl Recording {
-    /// Treats the repeated readings of the recording and reports them in the provenance.
+    /// Treats repeated readings and reports them in the provenance.
     ///
-    /// The first row of a run is kept. Under sample and hold and under [`RepeatedReadings::Collapse`] a run continues through changes of the
-    /// contact: its later rows have an outdated reading.
+    /// Keeps the first row of a run. Under sample and hold and [`RepeatedReadings::Collapse`], runs continue
+    /// through changes of contact, because later rows are outdated.
     #[must_use]
     pub fn treat_repeated_readings(mut self, treatment: RepeatedReadings) -> Self {
         let of = self.rows.len();
@@ -69,20 +69,18 @@ impl Recording {
         self
     }
 
-    /// Number of rows that repeat the row before them under sample and hold; `None` where chance explains the repeats.
+    /// Repeats under sample and hold.
     pub(super) fn counted_repeats(&self) -> Option<u64> {
         let counts = self.repeat_counts();
         (counts.cause() == Some(RepeatCause::SampleAndHold)).then(|| counts.repeats())
     }
 
-    /// Channels that repeat their value more often than their noise explains.
     fn slow_channels(&self) -> Vec<String> {
         let counts = self.repeat_counts();
         let slow = self.channels.iter().enumerate().filter(|(c, _)| counts.is_slow(*c));
         slow.map(|(_, channel)| channel.clone()).collect()
     }
 
-    /// Counts over the pairs of consecutive rows of one contact.
     fn repeat_counts(&self) -> RepeatCounts {
         let channels = self.channels.len();
         let mut counts = RepeatCounts::new(channels);
@@ -113,11 +111,10 @@ fn is_same_contact(a: &Row, b: &Row) -> bool {
     place(a) == place(b) && a.force_n == b.force_n && a.nuisances == b.nuisances
 }
 
-/// Rule by which two consecutive rows belong to one stretch: one place, and a force and nuisance coordinates that change no more than usual.
-///
-/// The bound is the median change of consecutive rows of one place. It is 0 for rows with nominal forces and the scatter of measured ones.
+/// Consecutive rows belong to one stretch if they have one place and usual changes of force and nuisance
+/// coordinates: at most the median, 0 for nominal forces and the scatter for measured ones.
 struct Stretches {
-    /// False where no two consecutive rows have one place, as of a sliding contact: all rows are one stretch.
+    /// False for a sliding contact: all rows are then one stretch.
     by_place: bool,
     force_n: f64,
     nuisances: Vec<f64>,

@@ -1,42 +1,40 @@
-//! Detection of readings that a logger repeats because it is faster than its sensors (sample and hold).
+//! Detection of sample and hold: a logger faster than its sensors repeats all channels together.
 //!
-//! A sample-and-hold logger repeats all channels together; a coarse converter repeats each channel by chance. Three tests over pairs of
-//! consecutive readings of one contact distinguish the two, each with the false-alarm rate [`FALSE_ALARM`].
+//! Three tests distinguish it from chance repeats of coarse converters, each with false-alarm rate
+//! [`FALSE_ALARM`]:
 //!
-//! 1. *Size of changes.* Rounded Gaussian noise that often changes by 3 resolution steps or more rarely repeats a value. A likelihood-ratio
-//!    test compares three counts with the best rounded Gaussian distribution: repeats, changes below 2.5 steps, and changes from 2.5 steps on.
-//! 2. *Coincidence of changes.* Of n pairs, channel c changes in d_c, and at least one channel in u. With independent channels
-//!    P(U ≤ u) ≤ C(n, u) · Π_c C(u, d_c) / C(n, d_c), the union bound over the sets of u pairs. Fisher's method combines the stretches.
-//!    The pairs that change determine the repeats by chance, as captures determine the unseen in capture–recapture with independent captures.
-//! 3. *No change at all.* Noise of half a resolution step or more repeats a value with a probability of at most 0.52. Repeats that
-//!    never differ show that the noise is less; they add no information, for any cause.
+//! 1. *Size of changes.* Fine Gaussian noise, with mostly large changes, rarely repeats a value. A
+//!    likelihood-ratio test compares counts of repeats, changes below 2.5 steps and larger changes with
+//!    rounded Gaussian noise.
+//! 2. *Coincidence of changes.* Of n pairs, channel c changes in d_c, and at least one channel in u. For
+//!    independent channels P(U ≤ u) ≤ C(n, u) · Π_c C(u, d_c) / C(n, d_c) (union bound), combined over
+//!    stretches by Fisher's method. Chance repeats are estimated by capture–recapture.
+//! 3. *No change.* Noise of at least half a step repeats a value with probability at most 0.52.
 
 use palpate_numerics::{bisect, chi_squared_critical_value, chi_squared_survival, normal_cdf};
 
-/// Probability, by stated policy, that a recording of independent channels is classified as sample and hold.
+/// False-alarm rate for independent channels, by policy.
 pub const FALSE_ALARM: f64 = 1e-6;
 
-/// Greatest number of changes of each channel with stored sizes.
+/// Stored change sizes per channel.
 const SIZES: usize = 256;
-/// Two values with a relative difference of at most this differ by the rounding of their arithmetic only.
+/// Relative rounding of equal values.
 const ROUNDING: f64 = 1e-12;
-/// Changes above this number of resolution steps are large; the bound lies between 2 and 3 steps.
+/// Bound of large changes, between 2 and 3 steps.
 const LARGE_STEPS: f64 = 2.5;
-/// Greatest share of repeats by chance among all repeats, by policy; with more the channels are coarse.
+/// Greatest share of chance repeats, by policy.
 const CHANCE_SHARE: f64 = 0.5;
 
-/// Cause of repeated readings.
+/// Cause of repeats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RepeatCause {
     /// The logger is faster than its sensors.
     SampleAndHold,
-    /// No repeat differs from the reading before it: the noise is less than the resolution, or the logger is faster than its sensors.
+    /// No repeat differs: low noise, or a fast logger.
     NoChange,
 }
 
-/// Counts of repeated values over pairs of consecutive readings, which determine the cause of the repeats.
-///
-/// Pairs come in stretches: the readings of one contact, or of the untouched surface.
+/// Counts of repeats over pairs of consecutive readings in stretches of one contact.
 ///
 /// ```
 /// use palpate_estimators::recording::{RepeatCause, RepeatCounts};
@@ -51,51 +49,43 @@ pub enum RepeatCause {
 pub struct RepeatCounts {
     channels: Vec<Changes>,
     stretch: Stretch,
-    /// Sum over the finished stretches.
     finished: Coincidence,
     pairs: u64,
     repeats: u64,
 }
 
-/// Changes of one channel.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Changes {
     count: u64,
-    /// Pairs in which the channel stays at an end of its range, where it may be clipped.
+    /// Pairs at an end of the range, possibly clipped.
     clipped: u64,
-    /// Least and greatest value, where they are known.
     range: Option<[f64; 2]>,
-    /// Sizes of the first changes.
     sizes: Vec<f64>,
-    /// Smallest difference of two unequal values; 0 before the first difference.
+    /// Smallest difference of unequal values.
     step: f64,
 }
 
-/// Counts of the pairs of one stretch.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Stretch {
     pairs: u64,
-    /// Pairs in which some channel changes.
+    /// Pairs with any change.
     changed: u64,
-    /// Pairs in which each channel changes.
     changes: Vec<u64>,
 }
 
-/// Evidence from the stretches that changes of the channels coincide.
+/// Evidence of coincident changes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Coincidence {
-    /// Number of stretches with a change.
     stretches: usize,
-    /// Sum over these stretches of ln of the bound of P(U ≤ u).
+    /// ln of the bound of P(U ≤ u), summed.
     ln_probability: f64,
-    /// Pairs without a change.
     repeats: f64,
-    /// Estimated number of pairs without a change by chance.
+    /// Chance repeats.
     chance: f64,
 }
 
 impl RepeatCounts {
-    /// Counts for this number of channels, without pairs.
+    /// Creates empty counts.
     pub fn new(channels: usize) -> Self {
         Self {
             channels: vec![Changes::default(); channels],
@@ -106,7 +96,7 @@ impl RepeatCounts {
         }
     }
 
-    /// Adds a pair of consecutive readings of one stretch; values beyond the number of channels are ignored.
+    /// Adds consecutive readings of one stretch.
     pub fn add(&mut self, before: &[f64], after: &[f64]) {
         let mut repeats = true;
         let mut is_clipped = true;
@@ -130,16 +120,15 @@ impl RepeatCounts {
         self.stretch.changed += u64::from(!repeats);
     }
 
-    /// Ends a stretch: the next pair belongs to another contact.
+    /// Ends a stretch.
     pub fn end_stretch(&mut self) {
         let channels = self.channels.len();
         let stretch = std::mem::replace(&mut self.stretch, Stretch::new(channels));
         self.finished = self.finished.plus(&stretch);
     }
 
-    /// Sets the range and the resolution step of a channel from all its values, before the first pair.
-    ///
-    /// Repeats at the ends of the range then do not count as evidence: the channel may be clipped there.
+    /// Sets a channel's range and step before the first pair. Repeats at the ends of the range then do not
+    /// count, because the channel may be clipped.
     pub fn set_range(&mut self, channel: usize, values: impl IntoIterator<Item = f64>) {
         let mut values: Vec<f64> = values.into_iter().collect();
         values.sort_by(f64::total_cmp);
@@ -156,17 +145,16 @@ impl RepeatCounts {
         self.pairs
     }
 
-    /// Number of pairs in which every channel repeats its value, at least one channel within its range.
+    /// Pairs in which every channel repeats, at least one within its range.
     pub fn repeats(&self) -> u64 {
         self.repeats
     }
 
-    /// Number of pairs in which this channel repeats its value within its range.
     fn channel_repeats(&self, channel: usize) -> u64 {
         self.pairs - self.channels.get(channel).map_or(0, |changes| changes.count + changes.clipped)
     }
 
-    /// Cause of the repeated readings; `None` without repeats, and where chance explains them.
+    /// Cause of the repeats; `None` for chance.
     pub fn cause(&self) -> Option<RepeatCause> {
         if self.repeats == 0 {
             return None;
@@ -182,24 +170,23 @@ impl RepeatCounts {
         held.then_some(RepeatCause::SampleAndHold)
     }
 
-    /// True for a channel that repeats its value more often than rounded Gaussian noise with changes of its sizes does.
+    /// True if rounded Gaussian noise does not explain the repeats.
     pub fn is_slow(&self, channel: usize) -> bool {
         let Some(changes) = self.channels.get(channel) else { return false };
         changes.exceed_rounding(self.channel_repeats(channel))
     }
 }
 
-/// Greatest probability that rounded Gaussian noise of half a step repeats a value; differences have a standard deviation of √2/2 steps.
+/// Noise of half a step; differences have standard deviation √2/2.
 fn noisy_repeat_probability() -> f64 {
     within_steps(0.5, std::f64::consts::FRAC_1_SQRT_2)
 }
 
-/// Probability that a Gaussian difference of this standard deviation in steps is less than `steps` in size.
 fn within_steps(steps: f64, sd: f64) -> f64 {
     1.0 - 2.0 * normal_cdf(-steps / sd)
 }
 
-/// True for two readings of the same values in every channel.
+/// True for equal values in every channel.
 pub fn is_same_reading(a: &[f64], b: &[f64]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| is_equal(*a, *b))
 }
@@ -221,7 +208,7 @@ impl Changes {
         }
     }
 
-    /// True where the size of the changes rejects rounded Gaussian noise (test 1).
+    /// Test 1.
     fn exceed_rounding(&self, repeats: u64) -> bool {
         if self.sizes.is_empty() || repeats == 0 {
             return false;
@@ -260,15 +247,15 @@ impl Stretch {
         Self { pairs: 0, changed: 0, changes: vec![0; channels] }
     }
 
-    /// ln of the bound of P(U ≤ u), at most 0.
+    /// ln of the bound of P(U ≤ u).
     fn ln_probability(&self) -> f64 {
         let (n, u) = (self.pairs as f64, self.changed as f64);
         let channels = self.changes.iter().map(|d| ln_choose(u, *d as f64) - ln_choose(n, *d as f64));
         (ln_choose(n, u) + channels.sum::<f64>()).min(0.0)
     }
 
-    /// Expected pairs without a change for independent channels, from the u pairs with one: u (1 − Z) / Z. Z is the probability that some channel
-    /// changes, with Π_c (1 − Z d_c / u) = 1 − Z. Infinite where no two channels change together.
+    /// u (1 − Z) / Z, with Π_c (1 − Z d_c / u) = 1 − Z the probability of no change; infinite without common
+    /// changes.
     fn chance_repeats(&self) -> f64 {
         let u = self.changed as f64;
         let shares: Vec<f64> = self.changes.iter().map(|d| *d as f64 / u).collect();
@@ -295,7 +282,7 @@ impl Coincidence {
         }
     }
 
-    /// True where Fisher's method over the stretches rejects independent channels, and few repeats are by chance.
+    /// Fisher's method rejects independent channels, and few repeats are by chance.
     fn is_certain(&self) -> bool {
         self.stretches > 0
             && self.chance < CHANCE_SHARE * self.repeats
@@ -303,7 +290,6 @@ impl Coincidence {
     }
 }
 
-/// ln of the number of ways to choose k of n.
 fn ln_choose(n: f64, k: f64) -> f64 {
     libm::lgamma(n + 1.0) - libm::lgamma(k + 1.0) - libm::lgamma(n - k + 1.0)
 }

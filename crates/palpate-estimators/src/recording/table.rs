@@ -1,4 +1,4 @@
-//! A CSV file before its columns have roles.
+//! CSV table without roles.
 
 use std::io::Read;
 
@@ -16,28 +16,28 @@ use palpate_mechanics::units::Unit;
 use std::cmp::Reverse;
 use std::ops::Range;
 
-/// The columns of a CSV file and their content.
+/// CSV table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// Whether the first line names the columns. It does unless all its fields are numbers or times.
+    /// Absent if the first line has only numbers and times.
     pub header: Header,
-    /// The columns, from left to right.
+    /// Columns.
     pub columns: Vec<TableColumn>,
     /// Number of rows.
     pub rows: usize,
 }
 
-/// One column of a [`Table`].
+/// Column of a [`Table`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableColumn {
-    /// Name in the header; the column's number, from 1, in a file without a header.
+    /// Name, or number from 1 without header.
     pub heading: String,
-    /// Content of the rows.
+    /// Content.
     pub content: Content,
 }
 
 impl TableColumn {
-    /// The number of each row, `None` for an empty field. The result is `None` where a row has other content, or no row has a number.
+    /// Number of each row, `None` for an empty field; `None` for other content.
     pub fn numbers(&self) -> Option<Vec<Option<f64>>> {
         match &self.content {
             Content::Numbers(numbers) => Some(numbers.iter().copied().map(Some).collect()),
@@ -46,7 +46,7 @@ impl TableColumn {
         }
     }
 
-    /// Marks of the rows: true for 1, a yes or similar, false for 0, a no or an empty field. The result is `None` where a row has other content.
+    /// Marks; `None` for other content.
     pub fn marks(&self) -> Option<Vec<bool>> {
         let mark = |number: Option<f64>| match number {
             Some(1.0) => Some(true),
@@ -63,34 +63,34 @@ impl TableColumn {
 /// Content of a column.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Content {
-    /// All rows are empty.
+    /// Empty rows only.
     Empty,
-    /// A finite number in every row, as written.
+    /// Number in every row.
     Numbers(Vec<f64>),
-    /// A finite number in some rows; the other rows are empty.
+    /// Numbers and empty rows.
     Gaps {
-        /// The number of each row.
+        /// Numbers.
         numbers: Vec<Option<f64>>,
-        /// The line of the first row without a number.
+        /// First line without number.
         line: usize,
     },
-    /// A timestamp in every row.
+    /// Timestamps.
     Times,
-    /// A yes, a no or an empty field in every row, as in a column that marks untouched rows; true for a yes.
+    /// Yes, no or empty; true for yes.
     Marks(Vec<bool>),
     /// Anything else.
     Other {
-        /// Number of rows with a number.
+        /// Rows with numbers.
         numbers: usize,
-        /// The line of the first field that is neither number nor timestamp, or of another kind than the first.
+        /// First other line.
         line: usize,
-        /// Text of this field.
+        /// Text there.
         text: String,
     },
 }
 
 impl Table {
-    /// Reads a file of any dialect. The file determines the separator and the decimal mark where the arguments are `None`.
+    /// Reads a file; detects separator and decimal mark unless given.
     ///
     /// ```
     /// use palpate_estimators::recording::{Content, Table};
@@ -102,8 +102,7 @@ impl Table {
     /// ```
     ///
     /// # Errors
-    /// [`CsvError`], with line and column: a row of another length than the first line, an empty file, no rows, bytes that are not text,
-    /// separators that cannot be distinguished, a number that may have a decimal comma or thousands.
+    /// [`CsvError`], with line and column.
     pub fn read(
         source: &str,
         bytes: impl Read,
@@ -159,10 +158,9 @@ impl Table {
     }
 }
 
-/// Greatest number of lines that determine the shape of a file, several times the length of a preamble.
+/// Lines that determine the shape.
 const MOST_LINES: usize = 1000;
 
-/// Shape of a file: its separator, whether it has a header, and the line of its heading or of its first row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Shape {
     separator: Separator,
@@ -171,7 +169,7 @@ struct Shape {
 }
 
 impl Shape {
-    /// The shape of the longest run of lines that one separator cuts into equally many fields.
+    /// Longest run of lines with equal numbers of fields.
     fn find(file: &File, separator: Option<Separator>) -> Result<Self, CsvError> {
         let mut texts = Texts::default();
         for (i, bytes) in file.lines().enumerate() {
@@ -196,7 +194,7 @@ impl Shape {
             }
             [block, ..] => (block.separator, &texts.lines[block.lines.clone()]),
             [] => {
-                // No two lines are alike: choose the separator that cuts the first line into most fields.
+                // No two lines are alike: choose the separator with the most fields in the first line.
                 let fields = |one: &Separator| split(first, *one).map_or(0, |fields| fields.len());
                 let separator =
                     separator.or(Separator::MARKS.into_iter().rev().max_by_key(fields)).unwrap_or_default();
@@ -211,11 +209,10 @@ impl Shape {
     }
 }
 
-/// Lines with a text that is not a comment.
 #[derive(Default)]
 struct Texts {
     lines: Vec<(usize, String)>,
-    /// The separator that a line `sep=;` declares.
+    /// Declared by a line `sep=;`.
     declared: Option<Separator>,
 }
 
@@ -232,17 +229,16 @@ impl Texts {
     }
 }
 
-/// A run of lines that a separator cuts into equally many fields.
+/// Lines with equal numbers of fields.
 struct Block {
     separator: Separator,
     lines: Range<usize>,
     fields: usize,
-    /// Number of fields of the last line that are not values.
+    /// Words in the last line.
     words: usize,
 }
 
 impl Block {
-    /// Longest block of a separator with more than one field a line; `None` without such a block.
     fn longest(lines: &[(usize, String)], separator: Separator) -> Option<Self> {
         let width = |(_, text): &(usize, String)| split(text, separator).map_or(0, |fields| fields.len());
         let widths: Vec<usize> = lines.iter().map(width).collect();
@@ -258,14 +254,14 @@ impl Block {
         Some(Self { separator, lines: range, fields, words })
     }
 
-    /// Order of preference: most lines, fewest words in the last one, no blanks, most fields.
+    /// Most lines, fewest words, no blanks, most fields.
     fn rank(&self) -> (Reverse<usize>, usize, bool, Reverse<usize>) {
         let is_blanks = self.separator == Separator::Blanks;
         (Reverse(self.lines.len()), self.words, is_blanks, Reverse(self.fields))
     }
 }
 
-/// The heading of a block: the line with most distinct words above the first row of values; the last one of several such lines.
+/// Last line with most distinct words above the first row of values.
 fn heading(block: &[(usize, String)], separator: Separator) -> Option<&(usize, String)> {
     let is_row = |(_, text): &(usize, String)| lines::is_row_of_values(text, separator, 1);
     let above = block.iter().position(is_row).unwrap_or(1).max(1);
@@ -273,21 +269,18 @@ fn heading(block: &[(usize, String)], separator: Separator) -> Option<&(usize, S
     block[..above.min(block.len())].iter().max_by_key(likeness)
 }
 
-/// Whether a line names the columns. It does unless all its fields are numbers or times.
 fn header_of(text: &str, separator: Separator) -> Header {
     if lines::is_row_of_values(text, separator, 1) { Header::Absent } else { Header::Present }
 }
 
-/// A column during reading. It has its own dialect, because a column without a role may have any notation.
+/// Column with its own dialect, because unused columns may have any notation.
 struct Column {
     dialect: Dialect,
     clock: Clock,
     filled: usize,
     numbers: Vec<Option<f64>>,
     times: usize,
-    /// Marks of the rows; `None` after a row that is neither marked nor unmarked.
     marks: Option<Vec<bool>>,
-    /// The line of the first empty field.
     gap: Option<usize>,
     other: Option<(usize, String)>,
 }
@@ -307,7 +300,7 @@ impl Column {
         }
     }
 
-    /// Adds the next field. The only error is an ambiguous number, which may be a thousand times as large; the caller must handle it.
+    /// An ambiguous number is an error, because it may be wrong by a factor of 1000.
     fn push(&mut self, line: usize, text: &str) -> Result<(), CsvProblem> {
         self.marks = self.marks.take().zip(is_mark(text)).map(|(mut marks, mark)| {
             marks.push(mark);

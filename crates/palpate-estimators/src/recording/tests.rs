@@ -17,7 +17,7 @@ fn channel(column: Column) -> ValueColumn {
     ValueColumn { column, unit: Unit::NONE }
 }
 
-/// Columns of a foreign bench: position `X` in mm, two raw channels, force `F`.
+/// Foreign bench: position `X` in mm, two raw channels, force `F`.
 fn foreign() -> Columns {
     Columns {
         header: Header::Present,
@@ -96,7 +96,7 @@ fn rows_have_times_where_a_column_tells_them() {
     assert!(other.unwrap_err().to_string().starts_with("bench.csv:3:5: `4` is written in another way"));
 }
 
-/// For each row of a file whether it is untouched, and the remarks on the file.
+/// Returns a flag of each untouched row, and the remarks on the file.
 fn untouched(columns: &Columns, text: &str) -> Result<(Vec<bool>, String), String> {
     let recording = read_as(columns, text.as_bytes()).map_err(|error| error.to_string())?;
     let said = recording.provenance.dialects.iter().map(ToString::to_string).collect();
@@ -224,7 +224,8 @@ fn what_no_rule_can_tell_is_refused_at_the_place() {
     let said = with(Some(Separator::Comma), Some(Decimal::Comma));
     let rows = read_as(&said, b"X,Pl,Pr,F\n10,\"1,234\",2,3\n").unwrap().rows;
     assert_eq!(rows[0].reading, [1.234, 2.0]);
-    // In millimetres as in the rig, with another notation. Parentheses may contain any text, and so may a heading that the rig contains in full.
+    // Units agree with the rig in another notation. Parentheses, and a heading given in full by the rig, may
+    // contain any text.
     assert!(read_as(&foreign(), b"X / mm,Pl (left),Pr [V],F (front)\n1,2,3,4\n").is_ok());
     let written_out = Columns { position: PositionColumns::Along(named("X [div]")), ..foreign() };
     assert!(read_as(&written_out, b"X [div],Pl,Pr,F\n1,2,3,4\n").is_ok());
@@ -257,7 +258,7 @@ fn columns_survive_json() {
     }
 }
 
-/// The message, then the line with a mark under the place of the error.
+/// Returns the message and the line, marked at the place of the error.
 fn pointed(error: &CsvError) -> String {
     let Some(place) = &error.place else { return error.to_string() };
     let before = place.text.get(..place.span.start).unwrap().chars().count();
@@ -336,7 +337,7 @@ fn folds_hold_out_every_position_once_with_all_its_rows() {
     assert_eq!(recording.folds(12), Err(TooFewPositions { found: 11, needed: 12 }));
 }
 
-/// A recording of two channels at ten positions, five sweeps over them, with a ripple as noise.
+/// Two channels at ten positions in five sweeps, with a ripple as noise.
 fn sweeps(reading: impl Fn(usize, usize) -> f64) -> Recording {
     let rows = (0..50).map(|row| Row {
         position: Position::along(0.01 * (row % 10) as f64),
@@ -431,7 +432,7 @@ proptest! {
         let mut bytes = Vec::new();
         write(&recording, *STRIP, "a\ntest", &mut bytes).unwrap();
         let columns = Columns::own(&recording.channels, &recording.kinds, *STRIP);
-        // Forces of all magnitudes are unlike those of a load cell.
+        // Forces of all magnitudes do not resemble those of a load cell.
         let columns = Columns { force_zero_n: Some(0.0), ..columns };
         let columns = ["nuisance_1", "nuisance_2"][..nuisances].iter().fold(columns, |columns, name| columns.nuisance(*name, Unit::NONE));
         let schema = Schema { columns: &columns, layout: &layout, extent: *STRIP, known_force_n: None };
@@ -495,7 +496,6 @@ fn drift_of_untouched_rows_is_named_and_channels_share_a_line() {
     insta::assert_snapshot!(recording.warning_lines().join("\n"));
 }
 
-/// Course of a drift over a recording, by the share of its rows.
 type Course = fn(f64) -> f64;
 
 #[test]

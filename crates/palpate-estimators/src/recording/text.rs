@@ -1,6 +1,6 @@
-//! The text of a file's bytes: UTF-8, UTF-16 with a byte-order mark, or Windows-1252.
+//! Text encodings: UTF-8, UTF-16 with a byte-order mark, Windows-1252.
 
-/// Converts UTF-16 with a byte-order mark to UTF-8, chunk by chunk; bytes of any other text pass unchanged.
+/// Streaming converter of UTF-16 to UTF-8; other bytes pass unchanged.
 ///
 /// ```
 /// use palpate_estimators::recording::TextDecoder;
@@ -13,7 +13,7 @@
 #[derive(Clone, Debug, Default)]
 pub struct TextDecoder {
     encoding: Option<Encoding>,
-    /// Bytes of an incomplete character.
+    /// Incomplete character.
     pending: Vec<u8>,
 }
 
@@ -24,7 +24,7 @@ enum Encoding {
 }
 
 impl TextDecoder {
-    /// The next bytes as UTF-8. Invalid UTF-16 becomes U+FFFD.
+    /// Decodes a chunk; invalid UTF-16 becomes U+FFFD.
     pub fn decode(&mut self, chunk: &[u8]) -> Vec<u8> {
         self.pending.extend_from_slice(chunk);
         let (encoding, mark) = match (self.encoding, self.pending.as_slice()) {
@@ -42,7 +42,7 @@ impl TextDecoder {
         }
     }
 
-    /// The remaining text after the last bytes.
+    /// Returns the remaining text.
     pub fn finish(self) -> Vec<u8> {
         match self.encoding {
             Some(Encoding::Utf16(_)) if !self.pending.is_empty() => "\u{fffd}".into(),
@@ -50,7 +50,7 @@ impl TextDecoder {
         }
     }
 
-    /// Whether the bytes are UTF-16.
+    /// True for UTF-16.
     pub fn is_utf16(&self) -> bool {
         matches!(self.encoding, Some(Encoding::Utf16(_)))
     }
@@ -70,9 +70,9 @@ impl TextDecoder {
     }
 }
 
-/// The text of a line that is not UTF-8, decoded as Windows-1252; `None` for undefined bytes and for null bytes.
+/// `None` for undefined and null bytes.
 pub(super) fn windows_1252(bytes: &[u8]) -> Option<String> {
-    /// Characters of the bytes 0x80 to 0x9F; a space marks an undefined byte.
+    /// 0x80 to 0x9F; spaces are undefined.
     const HIGH: &str = "€ ‚ƒ„…†‡ˆ‰Š‹Œ Ž  ‘’“”•–—˜™š›œ žŸ";
     bytes
         .iter()
@@ -96,7 +96,6 @@ mod tests {
         assert_eq!(windows_1252(b"\x80\x8e\x91\x9e\x9f").as_deref(), Some("€Ž‘žŸ"));
     }
 
-    /// The text decoded from chunks of this length.
     fn decoded(bytes: &[u8], length: usize) -> String {
         let mut decoder = TextDecoder::default();
         let mut text: Vec<u8> = bytes.chunks(length).flat_map(|chunk| decoder.decode(chunk)).collect();

@@ -1,32 +1,28 @@
-//! Times of rows: numbers, or timestamps relative to the first one.
+//! Row times: numbers, or timestamps relative to the first row.
 
 use super::csv_error::CsvProblem;
 
-/// Reads the times of one file's rows.
+/// Time converter of a file.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Clock {
     start: Option<Start>,
 }
 
-/// Time of the first row, which determines the notation of all others.
+/// The first row determines the notation.
 #[derive(Clone, Copy, Debug)]
 enum Start {
     Number,
     Timestamp {
         first: Timestamp,
-        /// Timestamp of the row above.
+        /// Previous row.
         previous: Timestamp,
     },
 }
 
-/// Nanoseconds in a day.
 const DAY_NS: i64 = 86_400_000_000_000;
 
 impl Clock {
-    /// The time in `text`, in seconds: the value of `number` for a number, the time since the first timestamp for a timestamp.
-    ///
-    /// # Errors
-    /// A text that is neither number nor timestamp; a time in another notation than that of the first row; a time of day that passes midnight.
+    /// Time in seconds, for timestamps since the first row; an error for another notation or midnight.
     pub fn read(
         &mut self,
         text: &str,
@@ -60,17 +56,15 @@ impl Clock {
     }
 }
 
-/// An instant, as far as its text determines it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Timestamp {
     kind: Kind,
-    /// Days since the first of March of the year 0; 0 for a time of day.
+    /// Days since 1 March of year 0.
     day: i64,
-    /// Nanoseconds since midnight, minus the offset from UTC.
+    /// Nanoseconds since midnight UTC.
     ns: i64,
 }
 
-/// Kind of a timestamp: a time of day, or a date and time with or without its time zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     TimeOfDay,
@@ -79,10 +73,8 @@ enum Kind {
 }
 
 impl Timestamp {
-    /// `14:03:25,120`, `2026-04-03T14:03:25.12+02:00`, `2026-04-03 14:03`, or `03.04.2026 14:03:25,120`; `None` for anything else.
-    ///
-    /// # Errors
-    /// A date with slashes, in which day and month cannot be distinguished.
+    /// `14:03:25,120`, `2026-04-03T14:03:25.12+02:00`, `2026-04-03 14:03` or `03.04.2026 14:03:25,120`; an
+    /// error for ambiguous slashes.
     fn parse(text: &str) -> Result<Option<Self>, CsvProblem> {
         let (date, time) = match text.find(['T', ' ', ',']).filter(|at| !text[..*at].contains(':')) {
             Some(at) => (&text[..at], text[at + 1..].trim_start()),
@@ -117,13 +109,12 @@ impl Timestamp {
     }
 }
 
-/// The number in a text of `count` digits; `None` for any other text.
 fn digits(text: &str, count: std::ops::RangeInclusive<usize>) -> Option<i64> {
     let all = count.contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_digit());
     if all { text.parse().ok() } else { None }
 }
 
-/// Days from the first of March of the year 0 to `2026-04-03`, `2026/04/03` or `03.04.2026`, in the Gregorian calendar.
+/// `2026-04-03`, `2026/04/03` or `03.04.2026`, Gregorian.
 fn day(date: &str) -> Option<i64> {
     let parts: Vec<&str> = date.split(['-', '.', '/']).collect();
     let separators: Vec<u8> = date.bytes().filter(|byte| b"-./".contains(byte)).collect();
@@ -144,13 +135,14 @@ fn day(date: &str) -> Option<i64> {
     if !(1..=last).contains(&day) {
         return None;
     }
-    // Years begin in March, so that the leap day is their last day. The lengths of the months then repeat every five months: 31 30 31 30 31.
+    // Years begin in March: the leap day is then their last day, and month lengths repeat every five months:
+    // 31 30 31 30 31.
     let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
     let before_year = 365 * year + year.div_euclid(4) - year.div_euclid(100) + year.div_euclid(400);
     Some(before_year + (153 * month + 2) / 5 + day - 1)
 }
 
-/// Nanoseconds from midnight to `14:03`, `14:03:25` or `14:03:25,120`. Digits beyond the ninth decimal are below the resolution of a clock.
+/// `14:03`, `14:03:25` or `14:03:25,120`.
 fn time_ns(time: &str) -> Option<i64> {
     let (whole, fraction) = match time.find(['.', ',']) {
         Some(at) => (&time[..at], Some(&time[at + 1..])),
@@ -179,7 +171,7 @@ fn time_ns(time: &str) -> Option<i64> {
     Some(((hour * 60 + minute) * 60 + second) * 1_000_000_000 + fraction_ns)
 }
 
-/// Offset of a clock from UTC in nanoseconds, positive ahead of UTC: `Z`, `+02:00`, `+0200`, `-05`.
+/// `Z`, `+02:00`, `+0200` or `-05`; positive ahead of UTC.
 fn offset_ns(offset: &str) -> Option<i64> {
     if offset == "Z" {
         return Some(0);

@@ -1,22 +1,22 @@
-//! Marks of untouched rows in a file or its rig.
+//! Marks of untouched rows.
 
 use palpate_mechanics::units::{Dimension, Quantity};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// Span of time in seconds; either end may be absent.
+/// Closed time span.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TimeSpan {
-    /// First time of the span; `None` for a span from the beginning.
+    /// Start in seconds, optional.
     pub from_s: Option<f64>,
-    /// Last time of the span; `None` for a span to the end.
+    /// End in seconds, optional.
     pub to_s: Option<f64>,
 }
 
 impl TimeSpan {
-    /// True for a time within the span, ends included.
+    /// True within the span.
     pub fn contains(&self, time_s: f64) -> bool {
         self.from_s.is_none_or(|from_s| from_s <= time_s) && self.to_s.is_none_or(|to_s| time_s <= to_s)
     }
@@ -29,16 +29,16 @@ impl fmt::Display for TimeSpan {
     }
 }
 
-/// A text that is not a span of time.
+/// Invalid time span.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{text}` is not a span of time{}; write it as in \"0 s..10 s\", \"95 s..\" or \"..2 min\"",
     reason(because)
 )]
 pub struct TimeSpanError {
-    /// The text.
+    /// Text.
     pub text: String,
-    /// Reason for the error; empty for a text without `..`.
+    /// Reason, or empty.
     pub because: String,
 }
 
@@ -49,7 +49,7 @@ fn reason(because: &str) -> String {
 impl FromStr for TimeSpan {
     type Err = TimeSpanError;
 
-    /// Reads `0 s..10 s`, `0..10 s`, `95 s..` and `..2 min`.
+    /// Parses `0 s..10 s`, `0..10 s`, `95 s..` and `..2 min`.
     fn from_str(text: &str) -> Result<Self, TimeSpanError> {
         let refuse = |because: String| TimeSpanError { text: text.to_owned(), because };
         let (from, to) = text.split_once("..").ok_or_else(|| refuse(String::new()))?;
@@ -65,7 +65,7 @@ impl FromStr for TimeSpan {
     }
 }
 
-/// True for a yes and false for a no or an empty field in the column that marks untouched rows; `None` for any other text.
+/// True for yes, false for no or empty.
 pub(super) fn is_mark(text: &str) -> Option<bool> {
     const YES: [&str; 7] = ["1", "true", "yes", "y", "x", "ja", "wahr"];
     const NO: [&str; 6] = ["", "0", "false", "no", "nein", "falsch"];

@@ -1,4 +1,4 @@
-//! Warnings about a recording that can still be used.
+//! Warnings about recordings.
 
 use std::fmt;
 use std::mem::discriminant;
@@ -8,125 +8,122 @@ use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::units::{Dimension, Quantity};
 use palpate_numerics::median;
 
-/// A defect of a recording that its owner should examine.
+/// Defect of a usable recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Warning {
-    /// Rows repeat the reading before them in every channel, and were left out.
+    /// Removed repeats.
     RepeatsLeftOut(Repeats),
-    /// Rows repeat the reading before them in every channel, and count as independent repeats.
+    /// Repeats counted as independent.
     RepeatsCounted {
-        /// Number of such rows.
+        /// Repeated rows.
         rows: u64,
-        /// Rows of the recording.
+        /// All rows.
         of: usize,
     },
-    /// Channels repeat their value while others change: their sensors are slower than the logger.
+    /// Channels slower than the logger.
     SlowChannels {
-        /// Names of the channels.
+        /// Channel names.
         channels: Vec<String>,
     },
-    /// The channel has the same value in every row.
+    /// Constant channel.
     Dead {
-        /// The channel's name.
+        /// Channel name.
         channel: String,
-        /// The value.
+        /// Constant value.
         value: Quantity,
     },
-    /// The channel is exactly at its highest or lowest value in at least a tenth of the rows, at three or more
-    /// distinct positions.
+    /// Extreme values in at least a tenth of the rows, at three or more positions.
     Saturated {
-        /// The channel's name.
+        /// Channel name.
         channel: String,
-        /// The extreme value.
+        /// Extreme value.
         at: Quantity,
-        /// Rows that have it.
+        /// Rows at this value.
         rows: usize,
-        /// Rows of the recording.
+        /// All rows.
         of: usize,
     },
-    /// Rows lie more than 8 standard deviations of a repeat, and more than 1 % of the channel's span, from the median of their repeats after
-    /// subtraction of a slow drift.
+    /// Outliers: more than 8 standard deviations, and 1 % of the channel's span, from the median of their
+    /// repeats, without drift.
     ///
-    /// Repeats are rows with the same position and force. The standard deviation is 1.4826/√2 times the median magnitude of the difference between
-    /// successive repeats, without equal ones. A few bad rows therefore do not mask themselves. The drift is a polyline through the medians of up
-    /// to 20 blocks of 5 rows or more. The fit alternates between the drift and the medians of the repeats. Where the drift has a warning of its
-    /// own, the blocks have 5 rows, and contacts and untouched rows may have a polyline each. A row may then deviate further by the change between
-    /// the knots beside it.
+    /// Repeats have equal position and force. The standard deviation is 1.4826/√2 times the median magnitude
+    /// of differences of successive unequal repeats. The drift is a polyline through medians of up to 20
+    /// blocks of at least 5 rows, fitted alternately with medians of repeats. After a drift warning, blocks
+    /// have 5 rows, contacts and untouched rows may have separate polylines, and limits grow by the change
+    /// between knots.
     RepeatsDisagree {
-        /// The channel's name.
+        /// Channel name.
         channel: String,
-        /// Number of rows beyond this limit.
+        /// Outliers.
         rows: usize,
-        /// Number of rows that have repeats.
+        /// Rows with repeats.
         of: usize,
-        /// The row furthest from the median of its repeats, counted from 1 below the header.
+        /// Worst row, from 1 below the header.
         worst_row: usize,
-        /// Distance from the median of its repeats, without the drift.
+        /// Worst deviation.
         deviation: Quantity,
-        /// The standard deviation of a repeat.
+        /// Standard deviation of a repeat.
         spread: Quantity,
     },
-    /// The later of two repeats is mostly on the same side of the earlier one.
+    /// Drift.
     ///
-    /// The test is the sign test of Cox and Stuart (1955), pooled over the positions. Each repeat of the first half is paired with one of the
-    /// second half; D is the number of rising pairs minus the number of falling pairs. A drift is reported where |D| is at least half of the pairs
-    /// and at least 4·√pairs. Repeats in immediate succession do not show a slow drift.
+    /// Sign test of Cox and Stuart (1955), pooled over positions: each repeat of the first half pairs with
+    /// one of the second. The difference D of rising and falling pairs has |D| ≥ half of the pairs and |D| ≥
+    /// 4·√pairs.
     Drift {
-        /// The channel's name.
+        /// Channel name.
         channel: String,
-        /// Rows in which the drift shows.
+        /// Drifting rows.
         rows: DriftRows,
-        /// Median change from the earlier to the later repeat.
+        /// Median change of the pairs.
         change: Quantity,
-        /// Pairs that changed in that direction.
+        /// Pairs in this direction.
         agreeing: usize,
-        /// Number of all pairs.
+        /// All pairs.
         pairs: usize,
     },
-    /// No force is positive, although the rows have forces.
+    /// No positive force.
     NoPositiveForce {
-        /// The least force, in newtons.
+        /// Least force, in newtons.
         least_n: f64,
     },
-    /// Some forces are negative and others positive.
+    /// Forces of both signs.
     NegativeForces {
-        /// Number of rows with a negative force.
+        /// Rows with negative force.
         rows: usize,
-        /// Number of rows with a contact.
+        /// Touched rows.
         of: usize,
-        /// The least force, in newtons.
+        /// Least force, in newtons.
         least_n: f64,
     },
 }
 
-/// Rows in which a drift shows.
+/// Rows with drift.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriftRows {
     /// Repeats of contacts.
     Contacts,
     /// Untouched rows.
     Untouched,
-    /// Both together, where neither shows the drift alone.
+    /// Both, if neither alone shows the drift.
     All,
 }
 
-/// Greatest number of channels that a warning names; the others are counted.
+/// Greatest number of named channels.
 const NAMED_CHANNELS: usize = 4;
 const SATURATED_SHARE: f64 = 0.1;
 const SATURATED_POSITIONS: usize = 3;
 const FAR_OUT_DEVIATIONS: f64 = 8.0;
 const FAR_OUT_SPAN: f64 = 0.01;
-/// Greatest number of blocks of rows with medians that determine a drift, and least number of rows in each block.
 const MOST_BLOCKS: usize = 20;
 const LEAST_BLOCK: usize = 5;
-/// Iterations of the alternating fit of the drift and the medians of the repeats. With 10 iterations, a linear drift over repeats in random order
-/// settles to 1 %.
+/// With 10, a linear drift over repeats in random order settles to 1 %.
 const DRIFT_TURNS: usize = 10;
 const DRIFT_SHARE: f64 = 0.5;
 const DRIFT_DEVIATIONS: f64 = 4.0;
 
 impl Recording {
-    /// Warnings, channel by channel; see [`Warning`] for the rules.
+    /// Returns the warnings.
     pub fn warnings(&self) -> Vec<Warning> {
         let repeats = self.repeats();
         let channels = (0..self.channels.len()).filter_map(|index| Channel::new(self, index));
@@ -134,7 +131,7 @@ impl Recording {
         self.repeat_warnings().into_iter().chain(of_channels).chain(self.force_warning()).collect()
     }
 
-    /// The warnings as lines of text, one for all channels with the same defect.
+    /// Returns one line per kind of defect.
     pub fn warning_lines(&self) -> Vec<String> {
         let warnings = self.warnings();
         let mut lines = Vec::new();
@@ -154,7 +151,6 @@ impl Recording {
         lines
     }
 
-    /// Warnings of rows and channels that repeat their values.
     fn repeat_warnings(&self) -> Vec<Warning> {
         let Some(repeats) = &self.provenance.repeats else {
             let counted =
@@ -167,7 +163,6 @@ impl Recording {
         left_out.into_iter().chain(slow).collect()
     }
 
-    /// The warning of forces if some or all of them have the wrong sign.
     fn force_warning(&self) -> Option<Warning> {
         let forces_n: Option<Vec<f64>> = self.rows.iter().map(|row| row.force_n).collect();
         let forces_n = forces_n.filter(|forces_n| !forces_n.is_empty())?;
@@ -181,7 +176,7 @@ impl Recording {
         }
     }
 
-    /// Row indices in groups of two or more with the same position and force, each in the order of recording.
+    /// Row indices of equal position and force, in order.
     pub(crate) fn repeats(&self) -> Vec<Vec<usize>> {
         let key = |i: &usize| {
             let row: &Row = &self.rows[*i];
@@ -194,7 +189,6 @@ impl Recording {
     }
 }
 
-/// One channel of a recording.
 struct Channel<'a> {
     recording: &'a Recording,
     index: usize,
@@ -204,7 +198,6 @@ struct Channel<'a> {
 }
 
 impl<'a> Channel<'a> {
-    /// `None` if a row lacks a value of the channel, or without rows.
     fn new(recording: &'a Recording, index: usize) -> Option<Self> {
         let values: Option<Vec<f64>> =
             recording.rows.iter().map(|row| row.reading.get(index).copied()).collect();
@@ -232,10 +225,8 @@ impl<'a> Channel<'a> {
         much.then(|| Warning::Saturated { channel: self.name(), at: self.quantity(extreme), rows, of })
     }
 
-    /// Warning of rows far from their repeats; `drift` is the channel's warning of a drift, if there is one.
-    ///
-    /// A drift with a warning need not be slow: its blocks have few rows. Contacts and untouched rows share one drift or have one each, whichever
-    /// explains more rows.
+    /// A drift with a warning may be fast, so its blocks are short. Contacts and untouched rows share a drift
+    /// or have one each, whichever explains more rows.
     fn repeats_disagree(&self, repeats: &[Vec<usize>], drift: Option<&Warning>) -> Option<Warning> {
         if drift.is_none() {
             let driftless = self.without_drift(repeats, MOST_BLOCKS);
@@ -253,7 +244,6 @@ impl<'a> Channel<'a> {
         far_off.into_iter().min_by_key(|warning| warning.as_ref().map_or(0, Warning::extent)).flatten()
     }
 
-    /// Warning of rows with values far from the median of their repeats.
     fn far_off(&self, driftless: &Driftless, repeats: &[Vec<usize>]) -> Option<Warning> {
         let Driftless { values, steps: drift_steps } = driftless;
         // Equal repeats of a slow or coarse channel do not show the scatter.
@@ -285,7 +275,7 @@ impl<'a> Channel<'a> {
         })
     }
 
-    /// The values minus a drift over at most `most_blocks` blocks of rows. The fit alternates between the drift and the medians of the repeats.
+    /// Alternates between the drift and the medians of the repeats.
     fn without_drift(&self, repeats: &[Vec<usize>], most_blocks: usize) -> Driftless {
         let mut rows: Vec<usize> = repeats.iter().flatten().copied().collect();
         rows.sort_unstable();
@@ -314,7 +304,7 @@ impl<'a> Channel<'a> {
         driftless
     }
 
-    /// Warning of a drift of contacts, else of untouched rows, else of both together.
+    /// Contacts, else untouched rows, else both.
     fn drift(&self, repeats: &[Vec<usize>]) -> Option<Warning> {
         let rows = &self.recording.rows;
         let is_of = |group: &Vec<usize>, kind: DriftRows| match kind {
@@ -364,19 +354,17 @@ impl<'a> Channel<'a> {
     }
 }
 
-/// Values of a channel minus a drift.
 struct Driftless {
     values: Vec<f64>,
-    /// Change of the drift between the knots beside each row; a curved drift deviates from the polyline by less.
+    /// Change between adjacent knots, which bounds the polyline's error.
     steps: Vec<f64>,
 }
 
-/// Median of the values of these rows; `None` without rows.
 fn median_of(values: &[f64], rows: &[usize]) -> Option<f64> {
     median(rows.iter().map(|i| values[*i]).collect())
 }
 
-/// Height at `at` of the polyline through two or more knots, extrapolated beyond its ends, and height of the step between the knots beside `at`.
+/// Extrapolated height at `at`, and step height.
 fn on_polyline(knots: &[(f64, f64)], at: f64) -> (f64, f64) {
     let piece = knots.partition_point(|(x, _)| *x < at).clamp(1, knots.len() - 1);
     let ((x0, y0), (x1, y1)) = (knots[piece - 1], knots[piece]);
@@ -384,7 +372,6 @@ fn on_polyline(knots: &[(f64, f64)], at: f64) -> (f64, f64) {
 }
 
 impl Warning {
-    /// The channel of a warning about one channel.
     fn channel(&self) -> Option<&str> {
         match self {
             Self::Dead { channel, .. }
@@ -399,7 +386,6 @@ impl Warning {
         }
     }
 
-    /// Number of rows or pairs that show the defect.
     fn extent(&self) -> usize {
         match self {
             Self::Saturated { rows, .. } | Self::RepeatsDisagree { rows, .. } => *rows,
@@ -409,9 +395,9 @@ impl Warning {
     }
 }
 
-/// One line for warnings of one kind: the warning with the most rows, then the names of the other channels.
+/// Worst warning, then other channels.
 fn group_line(group: &[&Warning]) -> String {
-    // The first of several with the same extent.
+    // The first of several warnings with the same extent.
     let Some(worst) = group.iter().rev().max_by_key(|warning| warning.extent()) else { return String::new() };
     let others = group.iter().filter_map(|warning| warning.channel());
     let others: Vec<&str> = others.filter(|channel| Some(*channel) != worst.channel()).collect();
@@ -424,7 +410,6 @@ fn group_line(group: &[&Warning]) -> String {
     }
 }
 
-/// The first few channels by name, and the number of the others.
 pub(crate) fn channel_list(channels: &[impl AsRef<str>]) -> String {
     let named = channels.iter().take(NAMED_CHANNELS).map(|channel| format!("`{}`", channel.as_ref()));
     let named = named.collect::<Vec<_>>().join(", ");

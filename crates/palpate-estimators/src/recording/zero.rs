@@ -1,40 +1,37 @@
-//! Readings minus the preceding untouched reading.
+//! Zero of readings.
 
 use super::Recording;
 use serde::{Deserialize, Serialize};
 
-/// Zero of a recording's readings.
+/// Zero of readings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Zero {
-    /// Readings stay as recorded, and calibration estimates one offset per channel.
+    /// As recorded; calibration estimates offsets.
     #[default]
     None,
-    /// The latest untouched reading before each row is the zero: for soft surfaces, which do not return to one offset.
+    /// Latest untouched reading, for surfaces without a stable offset.
     Last,
 }
 
 impl Zero {
-    /// True where readings stay as recorded.
+    /// True for readings as recorded.
     pub fn is_none(&self) -> bool {
         *self == Self::None
     }
 }
 
-/// A recording without the untouched rows that a zero needs.
+/// Zero without untouched rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`zero = \"last\"` needs untouched rows, and the recording has none: add rows of force 0")]
 pub struct NoUntouchedRow;
 
 impl Recording {
-    /// The recording with each reading minus the latest untouched reading before it. From rows before the first untouched row, that row is
-    /// subtracted. Rows are ordered by time, or as recorded if some row has no time.
-    ///
-    /// From an untouched row, the preceding untouched row is subtracted. Untouched rows then scatter like those after a tare with the latest
-    /// reading.
+    /// Subtracts from each reading the latest earlier untouched one, or else the first one, in order of time.
+    /// Untouched rows are then differences, which scatter as after a tare.
     ///
     /// # Errors
-    /// [`NoUntouchedRow`] where no row is untouched.
+    /// [`NoUntouchedRow`].
     pub fn zeroed(mut self, zero: Zero) -> Result<Self, NoUntouchedRow> {
         match zero {
             Zero::None => return Ok(self),
@@ -65,7 +62,6 @@ mod tests {
     use palpate_mechanics::contact::Position;
     use palpate_mechanics::sensing::{Layout, SensorKind};
 
-    /// Rows of time, force and the reading of one channel.
     fn recording(rows: &[(Option<f64>, f64, f64)]) -> Recording {
         let layout = Layout::even(SensorKind::Raw, 1, 0.2);
         let row = |&(time_s, force_n, value): &(Option<f64>, f64, f64)| Row {

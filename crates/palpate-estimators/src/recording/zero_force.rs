@@ -1,8 +1,6 @@
-//! Recognition of forces that are 0 except for the noise of the load cell.
+//! Recognition of forces that are 0 except for load-cell noise.
 //!
-//! A load cell never reads exactly 0. Rows without contact then have small forces of either sign, and their readings are those of the untouched
-//! surface. Such rows count as untouched under two conditions: a gap separates small from large forces, and the small forces do not explain the
-//! readings.
+//! A gap separates untouched rows from large forces, and their forces do not explain their readings.
 
 use super::Row;
 use palpate_mechanics::contact::Position;
@@ -11,25 +9,25 @@ use palpate_numerics::{chi_squared_critical_value, mean, normal_quantile};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Greatest probability that noise exceeds the gap, and greatest probability that its standard deviation is underestimated.
+/// Probability that noise exceeds the gap, and that its standard deviation is underestimated.
 const LEVEL: f64 = 0.01;
-/// Greatest standard error at which the confirmed share of the small forces distinguishes 0 from 1.
+/// Standard error of a share that distinguishes 0 from 1.
 const MOST_UNSURE: f64 = 0.25;
 
-/// Rows with a force that is 0 except for noise.
+/// Rows with force 0 except for noise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ZeroForce {
-    /// Greatest magnitude of a force that counts as 0, in newtons.
+    /// Greatest magnitude, in newtons.
     pub zero_n: f64,
-    /// Number of rows.
+    /// Row count.
     pub rows: usize,
-    /// Least force of these rows, in newtons.
+    /// Least force, in newtons.
     pub low_n: f64,
-    /// Greatest force of these rows, in newtons.
+    /// Greatest force, in newtons.
     pub high_n: f64,
 }
 
-// No force is NaN: a field that is not a finite number is refused.
+// No force is NaN: the reader accepts only finite numbers.
 impl Eq for ZeroForce {}
 
 impl fmt::Display for ZeroForce {
@@ -46,15 +44,13 @@ impl fmt::Display for ZeroForce {
     }
 }
 
-/// A row with a force that may be 0 except for noise.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sample<'a> {
     pub row: &'a Row,
-    /// Whether the row has a position; a row without one is not a press.
+    /// Rows without one are not presses.
     pub has_position: bool,
 }
 
-/// The rows that are untouched except for the noise of their forces, if there are any.
 pub(super) fn recognise(samples: &[Sample]) -> Option<ZeroForce> {
     let force = |sample: &Sample| sample.row.force_n.filter(|force_n| *force_n != 0.0);
     let mut forces_n: Vec<f64> = samples.iter().filter_map(force).map(f64::abs).collect();
@@ -71,10 +67,10 @@ pub(super) fn recognise(samples: &[Sample]) -> Option<ZeroForce> {
     Some(ZeroForce { zero_n, rows: small.len(), low_n, high_n })
 }
 
-/// A force within the widest gap of sorted magnitudes. Forces below the gap are the noise of 0; forces above it are not.
+/// A force within the widest gap of sorted magnitudes.
 ///
-/// Noise of k values with root mean square s reaches z·s·√(k/χ²), with z the normal quantile for all values at once and χ² the
-/// lower quantile for k degrees of freedom. The upper end of the gap must lie beyond this value.
+/// Noise of k values with root mean square s reaches z·s·√(k/χ²), with z the normal quantile for all values
+/// and χ² the lower quantile for k degrees of freedom. The gap must end beyond this value.
 fn gap(forces_n: &[f64]) -> Option<f64> {
     let quantile = normal_quantile(1.0 - LEVEL / (2.0 * forces_n.len() as f64));
     let mut squares = 0.0;
@@ -91,7 +87,7 @@ fn gap(forces_n: &[f64]) -> Option<f64> {
     (ratio > 1.0 && ratio.is_finite()).then(|| round_within(low_n, high_n))
 }
 
-/// The least of 1, 2 and 5 times a power of ten above the geometric mean of `low` and `high`; the mean where that is not below `high`.
+/// Least of 1, 2 and 5 times a power of ten above the geometric mean, or the mean.
 fn round_within(low: f64, high: f64) -> f64 {
     let middle = low.sqrt() * high.sqrt();
     let exponent = middle.log10().floor() as i32;
@@ -99,11 +95,9 @@ fn round_within(low: f64, high: f64) -> f64 {
     steps.into_iter().find(|step| (middle..high).contains(step)).unwrap_or(middle)
 }
 
-/// True where the rows of small forces are untouched.
-///
-/// If the forces were those of presses, each reading would differ from the mean reading of these rows by force times influence. The presses
-/// nearest to its place give the influence. The least-squares share of this product in the readings is 1 for presses and 0 for noise. Where the
-/// channels are too insensitive to decide, at least one force must have the sign that no press has.
+/// Presses change readings by force times influence, estimated from the nearest presses: the least-squares
+/// share is 1 for presses and 0 for noise. If undetermined, at least one force must have the sign that no
+/// press has.
 fn are_untouched(small: &[Sample], samples: &[Sample], zero_n: f64) -> bool {
     let placed: Vec<Sample> = small.iter().filter(|sample| sample.has_position).copied().collect();
     if placed.is_empty() {
@@ -115,7 +109,6 @@ fn are_untouched(small: &[Sample], samples: &[Sample], zero_n: f64) -> bool {
     }
 }
 
-/// True where a small force has the sign that no press has.
 fn signs_are_mixed(placed: &[Sample], samples: &[Sample], zero_n: f64) -> bool {
     let presses_n =
         || samples.iter().filter_map(|sample| sample.row.force_n).filter(|force_n| force_n.abs() > zero_n);
@@ -124,7 +117,7 @@ fn signs_are_mixed(placed: &[Sample], samples: &[Sample], zero_n: f64) -> bool {
         || (presses_n().all(|force_n| force_n < 0.0) && small_n().any(|force_n| force_n > 0.0))
 }
 
-/// Share of the rows' forces that their readings confirm, with its standard error; `None` where no channel or press determines it.
+/// Share of the forces that the readings confirm, with standard error.
 fn confirmed_share(placed: &[Sample], samples: &[Sample], zero_n: f64) -> Option<(f64, f64)> {
     let channels = placed.first()?.row.reading.len();
     let baseline: Vec<f64> =
@@ -153,7 +146,7 @@ fn confirmed_share(placed: &[Sample], samples: &[Sample], zero_n: f64) -> Option
     (squares > 0.0).then(|| (explained / squares, squares.sqrt().recip()))
 }
 
-/// Change of the readings per newton at the positions of the presses, sorted by x.
+/// Change per newton at the presses, sorted by x.
 struct Influences(Vec<(Position, Vec<f64>)>);
 
 impl Influences {
@@ -174,7 +167,6 @@ impl Influences {
         Self(presses.chunk_by(same).map(influence).collect())
     }
 
-    /// Change per newton at the press nearest to a position; `None` without presses.
     fn nearest(&self, position: Position) -> Option<&[f64]> {
         let after = self.0.partition_point(|(at, _)| at.x_m < position.x_m);
         let mut best: Option<(f64, &[f64])> = None;

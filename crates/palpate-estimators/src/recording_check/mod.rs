@@ -1,7 +1,4 @@
-//! Comparison of a recording with its setup: units, orientation, order of the channels, noise.
-//!
-//! Every estimator can be fitted to a recording with a wrong unit or of a mirrored surface. The checks here compare the information that both
-//! recording and rig contain. Each mismatch is one line with the key of the rig that corrects it.
+//! Consistency check of a recording and its setup.
 
 mod model;
 mod noise;
@@ -13,81 +10,81 @@ use crate::setup::Setup;
 use palpate_mechanics::units::{Dimension, Quantity, Unit, format_length_mm};
 use palpate_numerics::median;
 
-/// Probability, by stated policy, that a check of a recording that fits its setup warns.
+/// False-alarm rate, by policy.
 const FALSE_ALARM: f64 = 1e-3;
-/// Positions that cover less than this share of the surface are reported, by policy, if they cover half of it or more in another unit.
+/// Reported coverage, by policy, if another unit gives at least a half.
 const LITTLE_COVERED: f64 = 1.0 / 8.0;
-/// Positions that cover less than this share of the surface are reported for any unit, by policy.
+/// Reported coverage for any unit, by policy.
 const HARDLY_COVERED: f64 = 1.0 / 50.0;
-/// Forces and gains that differ by less than this factor do not indicate another unit, by policy. Stiffness and forces in rigs are as inaccurate.
+/// Least factor of another unit, by policy, because rigs are inaccurate.
 const ROUGHLY: f64 = 3.0;
-/// A unit explains a factor up to this remainder, by policy.
+/// Greatest unexplained factor, by policy.
 const UNIT_REMAINDER: f64 = 1.5;
 
-/// A contradiction between a recording and its setup.
+/// Mismatch of a recording and its setup.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mismatch {
-    /// The positions cover a small part of the surface.
+    /// Low coverage of the surface.
     Coverage {
-        /// Axis of the positions.
+        /// Axis.
         axis: Axis,
-        /// Length that they cover.
+        /// Covered length.
         covered_m: f64,
-        /// Length of the surface along the axis.
+        /// Surface length.
         of_m: f64,
-        /// Unit in which they cover half of it or more.
+        /// Unit of a coverage of at least a half.
         unit: Option<Unit>,
     },
-    /// The forces are not those of the setup.
+    /// Different forces.
     Forces {
-        /// Median of the recorded forces for [`ForceKey::Known`], the greatest one for [`ForceKey::Greatest`].
+        /// Median force for [`ForceKey::Known`], else the greatest.
         recorded_n: f64,
-        /// Force of the setup.
+        /// Setup force.
         setup_n: f64,
-        /// Key of the setup's force.
+        /// Key of the force.
         key: ForceKey,
         /// Unit that explains the factor.
         unit: Option<ForceUnit>,
     },
-    /// The readings fit the model better with other coordinates.
+    /// Better coordinates.
     Coordinates(Coordinates),
-    /// The readings fit the model better with another order of the channels.
+    /// Better channel order.
     ChannelOrder {
-        /// Each channel with the channel of the rig that its readings fit.
+        /// Recorded and fitting channels.
         pairs: Vec<(String, String)>,
     },
-    /// Channels are opposite in sign to the model.
+    /// Opposite sign.
     Sign {
-        /// Names of the channels.
+        /// Channel names.
         channels: Vec<String>,
-        /// True for all channels of the recording.
+        /// True for all channels.
         all: bool,
     },
-    /// Readings are a multiple of the model's.
+    /// Different gain.
     Gain {
-        /// Names of the channels.
+        /// Channel names.
         channels: Vec<String>,
         /// Median of reading over model.
         factor: f64,
-        /// Unit of the readings that explains the factor.
+        /// Unit of readings.
         unit: Option<Unit>,
-        /// Unit of the forces that explains it, where all channels have the factor.
+        /// Unit of forces, for a common factor.
         force_unit: Option<ForceUnit>,
     },
-    /// Repeats scatter more or less than the noise of the sensors.
+    /// Different noise.
     Noise {
-        /// Names of the channels.
+        /// Channel names.
         channels: Vec<String>,
-        /// Number of channels in the comparison.
+        /// Compared channels.
         of: usize,
-        /// Standard deviation of the repeats of the channel with the greatest deviation.
+        /// Worst standard deviation.
         measured: Quantity,
-        /// Standard deviation of a reading of this channel in the setup.
+        /// Standard deviation in the setup.
         setup: Quantity,
     },
 }
 
-/// Axis of positions.
+/// Position axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
     /// Along the length.
@@ -96,7 +93,7 @@ pub enum Axis {
     Across,
 }
 
-/// Key of a force in a rig.
+/// Force key in a rig.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ForceKey {
     /// `force` of `[contact]`.
@@ -105,7 +102,7 @@ pub enum ForceKey {
     Greatest,
 }
 
-/// Coordinates of contacts that fit the readings better than the recorded coordinates.
+/// Coordinates with a better fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coordinates {
     /// x → length − x.
@@ -116,18 +113,18 @@ pub enum Coordinates {
     Turned,
     /// x and y exchanged.
     Exchanged,
-    /// Positions in another unit.
+    /// Another unit.
     Unit(Unit),
 }
 
-/// Unit of force of load cells and scales, including units of weight.
+/// Unit of force or weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceUnit {
     /// Name.
     pub name: &'static str,
-    /// The unit in newtons.
+    /// Newtons.
     pub newtons: f64,
-    /// True for a unit that `force_unit` accepts.
+    /// True if accepted as `force_unit`.
     pub is_read: bool,
 }
 
@@ -142,9 +139,7 @@ const FORCE_UNITS: [ForceUnit; 6] = [
     ForceUnit { name: "kN", newtons: 1e3, is_read: true },
 ];
 
-/// Contradictions between a recording and its setup, each once; empty where they fit.
-///
-/// The model of the surface is compared only if the estimated time of its solution is at most a second.
+/// Returns the mismatches; compares the model only if its estimated solution time is at most a second.
 ///
 /// ```
 /// use palpate_estimators::recording_check::{Coordinates, Mismatch, check_recording};
@@ -162,7 +157,7 @@ const FORCE_UNITS: [ForceUnit; 6] = [
 pub fn check_recording(setup: &Setup, recording: &Recording) -> Vec<Mismatch> {
     let mut found = coverage(setup, recording);
     found.extend(forces(setup, recording));
-    // Positions and forces of a wrong unit fit no model.
+    // Positions and forces in a wrong unit fit no model.
     if found.is_empty() {
         found.extend(model::compare(setup, recording));
     }
@@ -222,21 +217,19 @@ fn forces(setup: &Setup, recording: &Recording) -> Option<Mismatch> {
     is_beyond.then_some(mismatch)
 }
 
-/// Newtons of the unit of the recording's forces.
 fn force_unit_n(setup: &Setup) -> f64 {
     setup.recording_columns().force.map_or(1.0, |force| force.values.unit.factor())
 }
 
 impl ForceUnit {
-    /// The unit that explains forces this factor too great: numbers in the unit, read in a unit of `read_n` newtons. `None` for factors near 1,
-    /// and for factors that no unit explains.
+    /// Unit that explains forces too large by `factor`, read in units of `read_n` newtons.
     fn explaining(factor: f64, read_n: f64) -> Option<Self> {
         let remainder = |unit: &Self| (factor * unit.newtons / read_n).ln().abs();
         let best = FORCE_UNITS.into_iter().min_by(|a, b| remainder(a).total_cmp(&remainder(b)))?;
         (factor.ln().abs() >= ROUGHLY.ln() && remainder(&best) <= UNIT_REMAINDER.ln()).then_some(best)
     }
 
-    /// The largest unit in which forces that exceed a bound by this factor lie between a tenth of the bound and the bound.
+    /// Largest unit that brings forces to 0.1–1 of their bound.
     fn below(factor: f64, read_n: f64) -> Option<Self> {
         let share = |unit: &Self| factor * unit.newtons / read_n;
         let is_off = factor >= ROUGHLY;

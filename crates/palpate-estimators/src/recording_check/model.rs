@@ -1,8 +1,8 @@
-//! Readings against the model of the surface: coordinates, order, sign and gain of the channels.
+//! Test of readings against the surface model.
 //!
-//! Each channel is regressed on its modelled reading, with an offset and a gain of its own, so that the comparison needs no unit. The unexplained
-//! share of variance u compares two explanations by the likelihood ratio (u₀/u₁)^(n/2). The logarithm of this ratio is averaged over the channels,
-//! because errors of the model are common to them.
+//! Each channel is regressed on its modelled reading with offset and gain. Unexplained shares of variance u
+//! compare explanations by the likelihood ratio (u₀/u₁)^(n/2), with the logarithm averaged over channels,
+//! because model errors are common.
 
 use super::{Coordinates, Mismatch, ROUGHLY, UNIT_REMAINDER, force_unit_n};
 use crate::recording::Recording;
@@ -15,16 +15,15 @@ use palpate_mechanics::surface::{Extent, Solving};
 use palpate_mechanics::units::{Dimension, Unit};
 use palpate_numerics::{mean, median};
 
-/// Likelihood ratio from which on another explanation is reported, by policy.
+/// Likelihood ratio of a reported explanation, by policy.
 const DECISIVE: f64 = 1e6;
-/// An explanation leaves at most this share of the variance unexplained.
+/// Greatest unexplained variance share.
 const UNEXPLAINED: f64 = 0.1;
-/// Shares below this are the rounding of the arithmetic.
+/// Rounding of variance shares.
 const LEAST_UNEXPLAINED: f64 = 1e-12;
-/// Greatest time to solve the surface, in seconds, for a comparison with the model.
+/// Greatest solution time in seconds.
 const SECONDS: f64 = 1.0;
 
-/// Mismatches of a recording and the model; empty for a surface without a model, and for one that takes long to solve.
 pub fn compare(setup: &Setup, recording: &Recording) -> Vec<Mismatch> {
     let Some(contacts) = MeanReadings::new(setup, recording) else { return Vec::new() };
     let Some(surface) = setup.surface().model() else { return Vec::new() };
@@ -50,16 +49,13 @@ pub fn compare(setup: &Setup, recording: &Recording) -> Vec<Mismatch> {
     gains(setup, &fits)
 }
 
-/// Mean reading of each contact.
 struct MeanReadings {
     contacts: Vec<Contact>,
-    /// Readings of each channel.
     channels: Vec<Vec<f64>>,
-    /// True where the forces were recorded or are known.
     has_forces: bool,
 }
 
-/// A channel's regression on its modelled reading.
+/// Regression on the modelled reading.
 #[derive(Clone, Copy, Debug)]
 struct ChannelFit {
     channel: usize,
@@ -68,7 +64,7 @@ struct ChannelFit {
 }
 
 impl MeanReadings {
-    /// `None` for too few contacts: an offset and a gain are estimated for each channel.
+    /// `None` for too few contacts.
     fn new(setup: &Setup, recording: &Recording) -> Option<Self> {
         let force_n = |i: usize| recording.rows[i].force_n.or(setup.force_n());
         let touched: Vec<usize> =
@@ -94,14 +90,14 @@ impl MeanReadings {
         })
     }
 
-    /// Modelled readings of each channel with other coordinates.
+    /// Modelled readings of each channel.
     fn modelled(&self, model: &CleanSensors, place: impl Fn(Position) -> Position) -> Vec<Vec<f64>> {
         let at = |contact: &Contact| model.reading(Contact { position: place(contact.position), ..*contact });
         let readings: Vec<Vec<f64>> = self.contacts.iter().map(at).collect();
         (0..self.channels.len()).map(|c| readings.iter().map(|reading| reading[c]).collect()).collect()
     }
 
-    /// Fits of the channels that vary in the recording and in the model.
+    /// Skips constant channels.
     fn fits(&self, modelled: &[Vec<f64>]) -> Vec<ChannelFit> {
         (0..self.channels.len()).filter_map(|c| self.fit(c, &modelled[c])).collect()
     }
@@ -122,7 +118,7 @@ impl MeanReadings {
         (fit.gain.is_finite() && fit.unexplained.is_finite()).then_some(fit)
     }
 
-    /// True where an explanation is good and decisively better than another, by the same channels.
+    /// True if `new` is good, and decisively better than `old`.
     fn is_better(&self, new: &[ChannelFit], old: &[ChannelFit]) -> bool {
         // An offset and a gain are fitted.
         let freedom = self.contacts.len() as f64 - 2.0;
@@ -133,7 +129,6 @@ impl MeanReadings {
             && 0.5 * freedom * mean(logs) > DECISIVE.ln()
     }
 
-    /// Other coordinates by which the readings fit the model decisively better; the best of them.
     fn better_coordinates(
         &self,
         setup: &Setup,
@@ -168,7 +163,6 @@ impl MeanReadings {
         best.map(|(candidate, _)| candidate)
     }
 
-    /// Another order of the channels by which the readings fit the model decisively better.
     fn better_order(&self, setup: &Setup, modelled: &[Vec<f64>], fits: &[ChannelFit]) -> Option<Mismatch> {
         let sensors = setup.layout().sensors();
         let is_alike = |a: usize, b: usize| sensors[a].kind == sensors[b].kind;
@@ -212,7 +206,6 @@ impl Coordinates {
     }
 }
 
-/// Mismatches of sign and gain of the channels that the model explains.
 fn gains(setup: &Setup, fits: &[ChannelFit]) -> Vec<Mismatch> {
     let explained: Vec<ChannelFit> =
         fits.iter().copied().filter(|fit| fit.unexplained <= UNEXPLAINED).collect();
@@ -237,7 +230,7 @@ fn gains(setup: &Setup, fits: &[ChannelFit]) -> Vec<Mismatch> {
         off = rest;
         let Some(factor) = median(group.iter().map(|fit| fit.gain.abs()).collect()) else { break };
         let is_common = group.len() == fits.len() && setup.layout().len() > 1;
-        // A force read too great makes the gain too small.
+        // Forces read as too large make the gain too small.
         let force_unit = ForceUnit::explaining(1.0 / factor, force_unit_n(setup)).filter(|_| is_common);
         let unit = reading_unit(setup, first.channel, kind, factor);
         found.push(Mismatch::Gain { channels: names(&group), factor, unit, force_unit });
@@ -245,7 +238,7 @@ fn gains(setup: &Setup, fits: &[ChannelFit]) -> Vec<Mismatch> {
     found
 }
 
-/// The unit that explains readings this factor too great: numbers in the unit, read in the channel's unit.
+/// Unit that explains readings too large by `factor`.
 fn reading_unit(setup: &Setup, channel: usize, kind: SensorKind, factor: f64) -> Option<Unit> {
     let read = setup.recording_columns().channels.get(channel)?.unit;
     let remainder = |unit: &Unit| (factor * unit.factor() / read.factor()).ln().abs();

@@ -1,4 +1,4 @@
-//! Scatter of repeats against the noise of the sensors.
+//! Test of the scatter of repeats.
 
 use super::{FALSE_ALARM, Mismatch};
 use crate::recording::Recording;
@@ -6,10 +6,10 @@ use crate::setup::Setup;
 use palpate_mechanics::units::Quantity;
 use palpate_numerics::{chi_squared_survival, mean_and_variance};
 
-/// Ratio of standard deviations from which on a difference is reported.
+/// Least reported ratio of standard deviations.
 const DIFFERENCE: f64 = 2.0;
 
-/// Channels with repeats that scatter at least twice or at most half as much as their noise, beyond chance by a χ² test.
+/// Scatter at least twice or at most half of the noise, by χ² tests.
 pub fn compare(setup: &Setup, recording: &Recording) -> Vec<Mismatch> {
     let sensors = setup.layout().sensors();
     let repeats = recording.repeats();
@@ -21,7 +21,7 @@ pub fn compare(setup: &Setup, recording: &Recording) -> Vec<Mismatch> {
         let (scatter, freedom) = pooled_variance(recording, &repeats, *c)?;
         let ratio = (scatter / (sd * sd)).sqrt();
         let survival = chi_squared_survival(freedom as f64 * ratio * ratio, freedom);
-        // Two tails of every channel.
+        // Two tails per channel.
         let tail = FALSE_ALARM / (2 * live.len()) as f64;
         let is_other =
             ratio >= DIFFERENCE && survival < tail || ratio <= 1.0 / DIFFERENCE && 1.0 - survival < tail;
@@ -31,7 +31,6 @@ pub fn compare(setup: &Setup, recording: &Recording) -> Vec<Mismatch> {
     [true, false].into_iter().filter_map(|above| mismatch(setup, &ratios, above, live.len())).collect()
 }
 
-/// The mismatch of the channels above or below their noise.
 fn mismatch(setup: &Setup, ratios: &[(usize, f64)], above: bool, of: usize) -> Option<Mismatch> {
     let sensors = setup.layout().sensors();
     let ratios = || ratios.iter().filter(|(_, ratio)| (*ratio > 1.0) == above);
@@ -47,7 +46,7 @@ fn mismatch(setup: &Setup, ratios: &[(usize, f64)], above: bool, of: usize) -> O
     })
 }
 
-/// Variance of a channel within its repeats and its degrees of freedom; `None` without repeats.
+/// With degrees of freedom.
 fn pooled_variance(recording: &Recording, repeats: &[Vec<usize>], channel: usize) -> Option<(f64, usize)> {
     let freedom: usize = repeats.iter().map(|rows| rows.len() - 1).sum();
     let squares = repeats.iter().map(|rows| {

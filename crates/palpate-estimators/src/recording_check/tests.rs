@@ -7,14 +7,14 @@ use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::Beam;
 use palpate_mechanics::units::{gpa, mm, newtons, um};
 
-/// The paper's beam with eight sensors of 5 µm, pressed at ten places five times by 3 N.
+/// The paper's beam with eight sensors of 5 µm, pressed five times at each of ten places by 3 N.
 fn paper() -> (Setup, Recording) {
     let setup = fixtures::paper(um(5.0), 1).setup;
     let recording = setup.simulate(&Training::even(10).repeated(5), 7).unwrap();
     (setup, recording)
 }
 
-/// A beam whose sensors lie at unequal distances from both ends, of unknown force.
+/// A beam with sensors at unequal distances from both ends, and with unknown force.
 fn lopsided() -> (Setup, Recording) {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0)).unwrap();
     let sensors = SensorKind::Strain.at_x([50.0, 110.0, 190.0, 230.0, 320.0].map(mm)).noise(1e-6);
@@ -42,7 +42,7 @@ fn a_recording_of_the_setup_has_no_mismatch() {
             assert_eq!(check_recording(&setup, &again), [], "seed {seed}");
         }
         assert_eq!(check_recording(&setup, &recording), []);
-        // A stiffness that is known roughly, and gains of the channels.
+        // An inaccurate stiffness, and gains of the channels.
         let soft = changed(&recording, |row| row.reading.iter_mut().for_each(|value| *value *= 1.4));
         let mismatches = check_recording(&setup, &soft);
         assert!(

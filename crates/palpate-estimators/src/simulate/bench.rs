@@ -1,4 +1,4 @@
-//! A simulated bench: sensors under a surface, their faults, and imperfections in the course of time.
+//! Simulated bench with faults and imperfections.
 
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -10,7 +10,7 @@ use crate::setup::Setup;
 use palpate_mechanics::contact::{Contact, Extent, Position};
 use palpate_numerics::watch::Watch;
 
-/// A simulated bench for repeated readings: gains, offsets and places of its sensors are drawn once, noise for each reading.
+/// Simulated bench: faults are drawn once, noise for each reading.
 ///
 /// ```
 /// use palpate_estimators::{setup::Setup, simulate::SimulatedBench};
@@ -35,23 +35,21 @@ pub struct SimulatedBench<'a> {
     seed: u64,
 }
 
-/// Positions along each side at which the range of a channel is searched.
 const RANGE_POSITIONS: u32 = 20;
 
 impl<'a> SimulatedBench<'a> {
-    /// The bench of a setup as drawn by a seed, with the imperfections of the setup.
+    /// Draws the bench of a setup.
     ///
     /// # Errors
-    /// [`SimulateError::NoModel`] for a measured surface, [`SimulateError::Surface`] where the surface's equations are not solved,
-    /// [`SimulateError::NoForce`] for imperfections without a force for the channels' ranges.
+    /// [`SimulateError`] without a model or a solution, or for imperfections without a force.
     pub fn new(setup: &'a Setup, seed: u64) -> Result<Self, SimulateError> {
         Self::new_watched(setup, seed, Watch::NONE)
     }
 
-    /// The bench of a setup as drawn by a seed, with the imperfections of the setup, watched while the surface is solved.
+    /// [`SimulatedBench::new`], watched.
     ///
     /// # Errors
-    /// As for [`SimulatedBench::new`], and [`SimulateError::Cancelled`].
+    /// As there, and [`SimulateError::Cancelled`].
     pub fn new_watched(setup: &'a Setup, seed: u64, watch: Watch) -> Result<Self, SimulateError> {
         let bench = Self::perfect_watched(setup, seed, watch)?;
         let Some(imperfections) = setup.imperfections() else { return Ok(bench) };
@@ -59,10 +57,10 @@ impl<'a> SimulatedBench<'a> {
         Ok(bench.with_imperfections(*imperfections, force_n))
     }
 
-    /// The bench with only the faults of its channels, without the imperfections of the setup.
+    /// [`SimulatedBench::new_watched`], without imperfections.
     ///
     /// # Errors
-    /// As for [`SimulatedBench::new_watched`], except for the force.
+    /// As there, except for the force.
     pub fn perfect_watched(setup: &'a Setup, seed: u64, watch: Watch) -> Result<Self, SimulateError> {
         let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
         surface.check_solution_watched(watch)?;
@@ -71,7 +69,7 @@ impl<'a> SimulatedBench<'a> {
         Ok(Self { extent: setup.surface().extent(), sensors, channels, range_force_n: 0.0, seed })
     }
 
-    /// This bench with these imperfections, at rest at time 0. Ranges of channels are for their force, or else for `range_force_n`, in newtons.
+    /// Sets the imperfections, at rest. Channel ranges are for their force, or else for `range_force_n`.
     #[must_use]
     pub fn with_imperfections(mut self, imperfections: Imperfections, range_force_n: f64) -> Self {
         let untouched = self.clean(&[]);
@@ -82,27 +80,27 @@ impl<'a> SimulatedBench<'a> {
         self
     }
 
-    /// This bench with another step of every channel's converter, in its SI unit.
+    /// Sets the resolution of every channel.
     ///
     /// # Errors
-    /// [`SimulateError::Layout`] for a step that is less than 0 or not finite.
+    /// [`SimulateError::Layout`] for an invalid step.
     pub fn with_resolution(mut self, step: f64) -> Result<Self, SimulateError> {
         let layout = &mut self.channels.layout;
         layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.resolution = step))?;
         Ok(self)
     }
 
-    /// This bench in the final state of an earlier recording; the seed draws noise and random walks from there on.
+    /// Continues from an earlier state, with new noise and walks.
     #[must_use]
     pub fn resumed(mut self, state: &BenchState, seed: u64) -> Self {
-        // A stream different from the initial one of any bench with this seed.
+        // A stream that differs from the initial one of any bench of this seed.
         self.channels.rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         self.channels.rng.long_jump();
         self.channels.imperfect = self.channels.imperfect.map(|channels| channels.resumed(state));
         self
     }
 
-    /// Faultless reading under contacts on the surface, in the SI unit of each sensor: the sum over the contacts, and 0 without any.
+    /// Returns the faultless reading, the sum over the contacts.
     pub fn clean(&self, contacts: &[Contact]) -> Vec<f64> {
         let mut sum = vec![0.0; self.channels.layout.len()];
         for contact in contacts {
@@ -112,28 +110,24 @@ impl<'a> SimulatedBench<'a> {
         sum
     }
 
-    /// Faultless reading under contacts, each spread by the soft layer where the bench has one.
+    /// Returns the faultless reading under the soft layer.
     pub fn clean_through_layer(&self, contacts: &[Contact]) -> Vec<f64> {
         let width_m = self.imperfections().map_or(0.0, |imperfections| imperfections.touch_width_m);
         let points = contacts.iter().flat_map(|contact| spread_contact(*contact, width_m, self.extent));
         self.clean(&points.collect::<Vec<_>>())
     }
 
-    /// Advances time by a step under constant contacts with the faultless reading `clean`. Returns the reading at the end of the step with the
-    /// imperfections, without noise.
+    /// Advances time under constant contacts, and returns the reading without noise.
     pub fn advance(&mut self, clean: &[f64], step_s: f64) -> Vec<f64> {
         self.channels.advance(clean, step_s)
     }
 
-    /// A reading of the faulty channels for the faultless reading `clean`, with fresh noise.
+    /// Returns a reading with fresh noise.
     pub fn measure(&mut self, clean: &[f64]) -> Vec<f64> {
         self.channels.measure(clean)
     }
 
-    /// The channels of a bench, with the imperfections of the setup; ranges are for their force, or else for `force_n`, in newtons.
-    ///
-    /// # Errors
-    /// As for [`SimulatedBench::perfect_watched`] where the setup has imperfections.
+    /// Channel ranges are for the stated force, or else for `force_n`.
     pub(super) fn channels_watched(
         setup: &'a Setup,
         force_n: f64,
@@ -150,12 +144,12 @@ impl<'a> SimulatedBench<'a> {
         self.channels.imperfect.as_ref().map(ImperfectChannels::imperfections)
     }
 
-    /// Time since the start in seconds, where the bench has imperfections.
+    /// Time since the start.
     pub fn time_s(&self) -> Option<f64> {
         self.channels.imperfect.as_ref().map(ImperfectChannels::time_s)
     }
 
-    /// State of the imperfections, for [`SimulatedBench::resumed`]; `None` without imperfections.
+    /// State for [`SimulatedBench::resumed`].
     pub fn state(&self) -> Option<BenchState> {
         let channels = self.channels.imperfect.as_ref()?;
         Some(BenchState {
@@ -166,7 +160,6 @@ impl<'a> SimulatedBench<'a> {
         })
     }
 
-    /// Largest deviation of each channel from its untouched reading, under a force on a grid of positions.
     fn ranges(&self, untouched: &[f64], force_n: f64) -> Vec<f64> {
         let along = |side_m: f64| {
             (1..RANGE_POSITIONS).map(move |i| side_m * f64::from(i) / f64::from(RANGE_POSITIONS))

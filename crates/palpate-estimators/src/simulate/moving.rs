@@ -1,4 +1,4 @@
-//! A moving contact, on a beam that swings or on a plate in balance.
+//! Simulated moving contacts.
 
 use super::{CleanSensors, READINGS_EACH, STAGE, SimulateError, SimulatedBench};
 use crate::imperfections::spread_contact;
@@ -11,54 +11,54 @@ use palpate_mechanics::surface::modal::{ModalBeam, ModalResponse};
 use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Watch;
 
-/// Modes of the beam that swing; the others follow the contact without delay. The tenth is a hundred times as fast as the first.
+/// Higher modes follow without delay.
 const MODES: usize = 10;
 
-/// Contacts that move over a surface: one or two, and the beam that swings under them.
+/// One or two moving contacts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MovingContacts {
-    /// The contact, or the first of two.
+    /// First contact.
     pub first: MovingContact,
-    /// The other one.
+    /// Second contact.
     pub second: Option<MovingContact>,
-    /// The beam with its inertia and damping; `None` for a plate, which is in balance at every reading.
+    /// Vibrating beam; `None` for a plate in balance.
     pub beam: Option<ModalBeam>,
-    /// Readings a second, in hertz; greater than 0.
+    /// Readings per second; greater than 0.
     pub rate_hz: f64,
 }
 
-/// One contact that moves.
+/// Moving contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MovingContact {
     /// Motion.
     pub motion: Motion,
-    /// Force of the contact in newtons; `None` for the force of the rig's presses.
+    /// Force; `None` for that of the presses.
     pub force_n: Option<f64>,
 }
 
 impl MovingContacts {
-    /// Time until every contact has arrived, in seconds.
+    /// Time until all motions end.
     pub fn duration_s(&self) -> f64 {
         self.moving().map(|contact| contact.motion.duration_s()).fold(0.0, f64::max)
     }
 
-    /// The contacts at `time_s`; `force_n` is the force, in newtons, of those without one of their own.
+    /// Returns the contacts at `time_s`, by default of `force_n`.
     pub fn contacts_at(&self, time_s: f64, force_n: f64) -> Vec<Contact> {
         let at =
             |contact: MovingContact| contact.motion.contact_at(time_s, contact.force_n.unwrap_or(force_n));
         self.moving().map(at).collect()
     }
 
-    /// These contacts, the first at another speed between its turns.
+    /// Sets the speed of the first contact.
     ///
     /// # Errors
-    /// [`OutOfRange`] for a speed that is not greater than 0 and finite.
+    /// [`OutOfRange`] unless positive and finite.
     pub fn at_speed(self, speed_m_per_s: f64) -> Result<Self, OutOfRange> {
         let motion = self.first.motion.with_speed(speed_m_per_s)?;
         Ok(Self { first: MovingContact { motion, ..self.first }, ..self })
     }
 
-    /// Ends of the straight pieces of all contacts' paths after `from_s`, `to_s` the last; see [`Motion::breaks_s`].
+    /// Ends of straight path pieces; see [`Motion::breaks_s`].
     fn pieces_s(&self, from_s: f64, to_s: f64) -> Vec<f64> {
         let mut ends: Vec<f64> =
             self.moving().flat_map(|contact| contact.motion.breaks_s(from_s, to_s)).collect();
@@ -73,15 +73,11 @@ impl MovingContacts {
     }
 }
 
-/// Moves contacts over the bench's simulated surface, and records what the faulty channels report: over a beam that swings,
-/// from its balance under them, or over a plate that is in balance at every reading. Gains and offsets are drawn once for
-/// the recording, noise for each reading. While a contact is lifted its force is 0, and its position is where it comes down
-/// again. Imperfections act in the course of the motion.
-///
-/// Equal seeds give equal recordings.
+/// Simulates moving contacts on a beam from balance, or a plate in balance, with draws as in
+/// [`simulate_at`](super::simulate_at). A lifted contact has force 0 at its next position.
 ///
 /// # Errors
-/// [`SimulateError`] when the bench has no force or no model.
+/// [`SimulateError`] without a force or a model.
 pub fn simulate_moving(
     setup: &Setup,
     moving: &MovingContacts,
@@ -90,10 +86,10 @@ pub fn simulate_moving(
     simulate_moving_watched(setup, moving, seed, Watch::NONE)
 }
 
-/// Moves contacts over the simulated surface as by [`simulate_moving`], watched.
+/// [`simulate_moving`], watched.
 ///
 /// # Errors
-/// As for [`simulate_moving`], and [`SimulateError::Cancelled`].
+/// As there, and [`SimulateError::Cancelled`].
 pub fn simulate_moving_watched(
     setup: &Setup,
     moving: &MovingContacts,
@@ -134,21 +130,19 @@ pub fn simulate_moving_watched(
     Ok(TimedRecording { recording, times_s, second })
 }
 
-/// The contacts, each spread where the setup has a soft layer.
 fn points_of(setup: &Setup, contacts: &[Contact]) -> Vec<Contact> {
     let width_m = setup.imperfections().map_or(0.0, |imperfections| imperfections.touch_width_m);
     let spread = |contact: &Contact| spread_contact(*contact, width_m, setup.surface().extent());
     contacts.iter().flat_map(spread).collect()
 }
 
-/// The surface under the contacts.
 enum Under<'a> {
     Swings(ModalResponse),
     Balances(CleanSensors<'a>),
 }
 
 impl Under<'_> {
-    /// Faultless reading of the sensors under `contacts`; a beam that swings has been advanced to them.
+    /// A vibrating beam has been advanced to the contacts.
     fn reading(&self, layout: &Layout, contacts: &[Contact]) -> Vec<f64> {
         match self {
             Self::Swings(response) => {
@@ -164,7 +158,6 @@ impl Under<'_> {
     }
 }
 
-/// Moves the contacts from one instant to another along their paths, for any time between readings.
 fn advance(
     response: &mut ModalResponse,
     moving: &MovingContacts,

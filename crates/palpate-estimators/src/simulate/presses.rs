@@ -1,4 +1,4 @@
-//! Presses of a bench with imperfections, in the course of time.
+//! Scheduled presses of a bench with imperfections.
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -11,28 +11,25 @@ use crate::setup::Setup;
 use palpate_mechanics::contact::{Contact, Extent, Position};
 use palpate_numerics::watch::Watch;
 
-/// One press: a contact, and the rows that record it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Press {
     pub contact: Contact,
     pub rows: usize,
 }
 
-/// A bench that is pressed by the schedule of its imperfections.
 pub(crate) struct PressedBench<'a> {
     setup: &'a Setup,
     imperfections: Imperfections,
     bench: SimulatedBench<'a>,
-    /// Random stream of the places of presses, separate from that of the noise.
     places: Xoshiro256PlusPlus,
     seed: u64,
 }
 
-/// Distinguishes the stream of places from those of noise, walks, finger and lost frames, which have the same seed.
+/// Distinguishes random streams of one seed.
 const PLACES: u64 = 0x91_ACE5;
 
 impl Press {
-    /// Presses from contacts that are listed as often as they are read: equal contacts in a row are one press.
+    /// Groups equal consecutive contacts.
     pub fn from_rows(contacts: &[Contact]) -> Vec<Self> {
         let equal = contacts.chunk_by(|one, next| one == next);
         equal.filter_map(|rows| Some(Self { contact: *rows.first()?, rows: rows.len() })).collect()
@@ -40,8 +37,7 @@ impl Press {
 }
 
 impl<'a> PressedBench<'a> {
-    /// The bench of a setup as drawn by a seed, at rest. Where neither imperfections nor setup have a force, ranges of channels are for the largest
-    /// of these presses.
+    /// Without a stated force, channel ranges are for the largest press.
     pub fn new(setup: &'a Setup, presses: &[Press], seed: u64, watch: Watch) -> Result<Self, SimulateError> {
         let imperfections = setup.imperfections().copied().unwrap_or_default();
         let largest_n = presses.iter().map(|press| press.contact.force_n.abs()).reduce(f64::max);
@@ -63,7 +59,6 @@ impl<'a> PressedBench<'a> {
         Ok(Self { setup, imperfections, bench, places, seed })
     }
 
-    /// The bench in the final state of an earlier recording.
     pub fn resumed(
         setup: &'a Setup,
         state: &BenchState,
@@ -74,14 +69,11 @@ impl<'a> PressedBench<'a> {
         Ok(Self { bench: pressed.bench.resumed(state, seed), seed, ..pressed })
     }
 
-    /// Waits for the pause between calibration and use.
     pub fn pause(&mut self) {
         let untouched = self.bench.clean(&[]);
         self.bench.advance(&untouched, self.imperfections.schedule.pause_s);
     }
 
-    /// Records presses, each displaced from its place with this standard deviation, and the untouched surface before the presses,
-    /// between them and after them.
     pub fn record(
         &mut self,
         presses: &[Press],
@@ -107,7 +99,6 @@ impl<'a> PressedBench<'a> {
         Ok(recording)
     }
 
-    /// Records the untouched surface before a press at this position.
     fn rest(&mut self, next: Position, rows: &mut Vec<Row>) {
         let schedule = self.imperfections.schedule;
         let count = schedule.untouched_rows as usize;
@@ -117,7 +108,7 @@ impl<'a> PressedBench<'a> {
         self.record_window(no_contact, &untouched, (schedule.rest_s - recorded_s).max(0.0), count, rows);
     }
 
-    /// Waits under a contact with this faultless reading, and records `count` rows after that.
+    /// Waits under a contact, then records `count` rows.
     fn record_window(
         &mut self,
         contact: Contact,
@@ -145,7 +136,6 @@ impl<'a> PressedBench<'a> {
         }
     }
 
-    /// A place beside the asked one, within the surface.
     fn pressed_place(&mut self, asked: Position, sd_m: Option<f64>, extent: Extent) -> Position {
         let Some(sd_m) = sd_m else { return asked };
         let mut beside = |at_m: f64, side_m: f64| {

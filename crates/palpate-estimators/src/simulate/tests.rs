@@ -158,7 +158,6 @@ fn simulations_stop_at_any_look_and_are_otherwise_the_same() {
     }
 }
 
-/// The paper's beam with these imperfections, pressed at ten places, two rows each.
 fn worn(imperfections: Imperfections) -> Example {
     let Example { setup, training } = paper(0.0, 2);
     Example { setup: setup.with_imperfections(imperfections).unwrap(), training }
@@ -214,7 +213,8 @@ fn presses_beside_their_places_are_recorded_at_the_asked_ones() {
     assert_eq!(recording.provenance.placement_sd_m, Some(2e-3));
     let asked = paper(0.0, 2).simulate(1);
     assert_eq!(recording.distinct_positions(), asked.distinct_positions());
-    // Sensor 4 reads more or less, by the slope of its influence, where the press is beside its place; two rows of one press are alike.
+    // Sensor 4 changes by the slope of its influence where the press is displaced; two rows of one press are
+    // equal.
     let pressed: Vec<&Row> = recording.rows.iter().filter(|row| row.touches()).collect();
     let beside_m: Vec<f64> = pressed
         .iter()
@@ -263,7 +263,7 @@ fn calibration_and_use_are_one_bench_that_goes_on() {
     let [end_s, start_s] =
         [split.training.rows.last(), split.judged.rows.first()].map(|row| row.unwrap().time_s.unwrap());
     assert!((start_s - end_s - 606.0).abs() < 1e-9, "{start_s} {end_s}");
-    // An evaluation of a locator continues from the same offsets too, with other walks.
+    // Evaluations continue from equal offsets too, with other walks.
     let contacts = [Contact { position: Position::along(0.1), force_n: 3.0 }];
     let used =
         simulate_use_watched(&example.setup, &split.training.provenance, &contacts, 9, Watch::NONE).unwrap();

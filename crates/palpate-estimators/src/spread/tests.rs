@@ -18,7 +18,6 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Readings of seven smooth channels of a force at a place.
 fn bells([x, y, force]: [f64; 3]) -> Vec<f64> {
     let bell = |(u, v): (f64, f64)| force * (-4.0 * ((x - u).powi(2) + (y - v).powi(2))).exp();
     [(0.0, 0.0), (0.5, 0.1), (1.0, 0.0), (0.1, 0.6), (0.6, 0.5), (0.2, 1.0), (0.9, 0.8)].map(bell).to_vec()
@@ -27,13 +26,12 @@ fn bells([x, y, force]: [f64; 3]) -> Vec<f64> {
 const LINE: About = About { at: [0.4, 0.3, 2.0], ends: [(0.0, 1.0), (0.3, 0.3), (0.0, f64::INFINITY)] };
 const PLANE: About = About { at: [0.4, 0.3, 2.0], ends: [(0.0, 1.0), (0.0, 1.0), (0.0, f64::INFINITY)] };
 
-/// Derivative of the reading of the contact `PLANE` by an unknown.
 fn tangent(k: usize) -> Vec<f64> {
     let moved = |by: f64| bells(std::array::from_fn(|i| PLANE.at[i] + if i == k { by } else { 0.0 }));
     moved(1e-6).iter().zip(moved(-1e-6)).map(|(a, b)| (a - b) / 2e-6).collect()
 }
 
-/// The part of a vector across the tangents by these unknowns.
+/// Component of a vector orthogonal to the tangents of these unknowns.
 fn residual(of: Vec<f64>, unknowns: &[usize]) -> Vec<f64> {
     let mut basis = Vec::new();
     unknowns.iter().for_each(|k| push_rest(&mut basis, tangent(*k), 0.0));
@@ -92,7 +90,7 @@ fn all_that_two_contacts_close_by_leave_is_along_the_directions() {
 
 #[test]
 fn directions_that_channels_do_not_tell_are_none() {
-    // Place and force use up two channels, and a force of 0 reads 0 at any place.
+    // Position and force use up two channels, and a force of 0 reads 0 everywhere.
     let two = SpreadDirections::about(LINE, |at| bells(at)[..2].to_vec());
     assert!(two.score(&[1e3, -1e3]) == 0.0 && two.on_line().is_none());
     let nothing = About { at: [0.4, 0.3, 0.0], ..PLANE };
@@ -108,16 +106,15 @@ fn bounds_are_the_quantiles_of_the_score() {
     assert!((palpate_numerics::chi_squared_survival(spread_bound(2), 3) - SPREAD_RATE).abs() < 1e-9);
 }
 
-/// Contacts of unknown force on a surface, with readings of 5 µm noise, and a locator that was fitted to presses.
+/// Contacts of unknown force, with readings of 5 µm noise, and a fitted locator.
 struct Told {
     physics: Setup,
     locator: Locator,
-    /// Forces of contacts in turn.
     forces_n: [f64; 3],
 }
 
 impl Told {
-    /// Percentage of `outside_model` among readings of one contact, and of two 50 mm apart along the surface.
+    /// Percentage of `outside_model` for one contact, and for two 50 mm apart.
     fn outside_percent(&self, readings: usize) -> [f64; 2] {
         let sensors = CleanSensors::new(self.physics.surface().model().unwrap(), self.physics.layout());
         let extent = self.physics.surface().extent();
@@ -163,7 +160,7 @@ fn without_model() -> (Setup, Recording) {
     (raw, presses)
 }
 
-/// Forces are the sum over all contacts: each of two contacts has half.
+/// Forces are the sum over contacts: each of two has half.
 #[test]
 fn two_contacts_of_unknown_force_are_told_and_one_is_not() {
     let forces_n = [3.0, 6.0, 12.0];
@@ -172,7 +169,8 @@ fn two_contacts_of_unknown_force_are_told_and_one_is_not() {
     let (raw, raw_presses) = without_model();
     let influence = || Estimator::Influence(Influence::default());
     let closed_form = Estimator::ClosedForm(ClosedForm::default());
-    // χ² alone detects 50, 50, 38 and 11 %; any test that rejects one of 200 readings of one contact detects 71 and 23 %.
+    // χ² alone detects 50, 50, 38 and 11 %; a test that rejects one of 200 point contacts detects 71 and 23
+    // %.
     let fitted = [
         (influence().fit_without_interval_check(FitTask::new(&line_setup(), &presses)).unwrap(), 60.0),
         (closed_form.fit_without_interval_check(FitTask::new(&line_setup(), &presses)).unwrap(), 60.0),

@@ -1,4 +1,4 @@
-//! Measured rates of the rule: how often noise alone is not `no_contact`, and how often a contact of the model is `outside_model`.
+//! Measured false-alarm rates of `no_contact` and `outside_model`.
 
 use super::*;
 use crate::closed_form::ClosedForm;
@@ -24,14 +24,14 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 #[test]
 fn the_bound_is_the_quantile_of_chi_squared() {
-    // For two degrees of freedom the distribution is exponential: P(χ² > b) = e^(−b/2).
+    // For two degrees of freedom P(χ² > b) = e^(−b/2).
     assert!((misfit_bound(2) + 2.0 * OUTSIDE_MODEL_RATE.ln()).abs() < 1e-6);
     assert_eq!(misfit_bound(0), misfit_bound(1));
 }
 
 #[test]
 fn learnt_bounds_see_every_place_of_a_recording_that_repeats_itself() {
-    // 800 presses at twenty places in turn. At one place the readings are off by 30.
+    // 800 presses at twenty positions in turn, with errors of 30 at one position.
     let off_at_one = |i: usize| if i % 20 == 7 { 30.0 } else { 1.0 };
     let rows = (0..800).map(|i| Row {
         position: Position::along(0.01 * (i % 20) as f64),
@@ -44,18 +44,18 @@ fn learnt_bounds_see_every_place_of_a_recording_that_repeats_itself() {
     assert_eq!(learnt_bounds([10.0, 100.0], &recording, |reading| [reading[0]; 2]), [60.0, 100.0]);
 }
 
-/// An estimator with known noise, on a bench.
+/// Estimator with known noise on a setup.
 struct Case {
     name: &'static str,
     bench: Example,
     estimator: Estimator,
-    /// Readings of noise alone, and as many of contacts.
+    /// Readings of noise, and as many of contacts.
     readings: usize,
-    /// The least and the greatest rate at which contacts may be `outside_model`, for all tests together.
+    /// Bounds on the rate of `outside_model` contacts, over all tests.
     outside: (f64, f64),
 }
 
-/// Presses at a place: so many that the learnt noise and influence functions are as good as those of the layout.
+/// Presses per position: learnt noise and influence functions are as good as those of the layout.
 const REPEATS: usize = 1000;
 
 fn influence() -> Estimator {
@@ -65,10 +65,10 @@ fn influence() -> Estimator {
 fn cases() -> [Case; 4] {
     let mut plane = plate(24, ChannelModel { noise_sd: 5e-6, ..ChannelModel::default() });
     plane.training = plane.training.repeated(REPEATS);
-    // Where a digit is hardly bent the linear theory gives the readings of the exact one, and takes a tenth of its time.
+    // At small deflections the linear theory equals the exact one, at a tenth of the time.
     let linear = Estimator::Digit(DigitEstimator::of_theory(DigitTheory::Linear));
     let case = |name, bench, estimator, readings| {
-        // At least as often as the more frequent of both, at most as often as both.
+        // At least the greater rate, at most the sum of both.
         let outside = (OUTSIDE_MODEL_RATE.max(SPREAD_RATE), OUTSIDE_MODEL_RATE + SPREAD_RATE);
         Case { name, bench, estimator, readings, outside }
     };
@@ -81,14 +81,14 @@ fn cases() -> [Case; 4] {
     ]
 }
 
-/// Numbers of readings of a case with a wrong status.
+/// Numbers of false alarms of a case.
 #[derive(Clone, Copy, Debug, Default)]
 struct FalseAlarms {
-    /// Readings of noise alone, beyond its bound.
+    /// Noise beyond its bound.
     beyond_noise: usize,
-    /// Readings of noise alone, within its bound, that a contact explains by more than its cost.
+    /// Noise within its bound that a contact explains by more than its cost.
     like_contact: usize,
-    /// Readings of contacts anywhere that are `outside_model`.
+    /// Contacts that are `outside_model`.
     outside_model: usize,
 }
 
@@ -129,8 +129,7 @@ fn whitened(setup: &Setup, reading: &[f64]) -> Array1<f64> {
         .collect()
 }
 
-/// Least and greatest number of false alarms among `count` readings at a rate. A rule of that rate misses each of them once in 10,000
-/// times: they are quantiles of the binomial distribution.
+/// Bounds on the number of false alarms, quantiles 1/10,000 of the binomial distribution.
 fn binomial_bounds(count: usize, rate: f64) -> (usize, usize) {
     const MISSED: f64 = 1e-4;
     let n = count as f64;
@@ -149,16 +148,16 @@ fn binomial_bounds(count: usize, rate: f64) -> (usize, usize) {
     (least, count)
 }
 
-/// Bound on the probability that a contact explains noise by more than `cost`: that whitened noise has a component greater than u = √cost
-/// along the whitened readings of some contact, all scaled to unit length. Its expected Euler characteristic (Adler and Taylor, Random
-/// Fields and Geometry, 2007, section 12.4) is Φ(−u) + (L₁/2π + L₂·u/(2π)^(3/2))·e^(−u²/2), with half the circumference L₁ and the area L₂
-/// of these readings. On a line L₁ is their length, and L₂ is 0.
+/// Bound on the probability that a contact explains noise by more than `cost`: noise exceeds u = √cost along
+/// some contact's unit reading. The expected Euler characteristic (Adler and Taylor, Random Fields and
+/// Geometry, 2007, section 12.4) is Φ(−u) + (L₁/2π + L₂·u/(2π)^(3/2))·e^(−u²/2), with half the circumference
+/// L₁ (on a line the length) and the area L₂ (0) of these readings.
 fn chance_of_contact(setup: &Setup, cost: f64) -> f64 {
     const SIDE: usize = 60;
     let clean = CleanSensors::new(setup.surface().model().unwrap(), setup.layout());
     let extent = setup.surface().extent();
     let rows = if extent.width_m().is_some() { SIDE } else { 1 };
-    // The direction of a zero reading is not a number, and adds 0 to the lengths below.
+    // The direction of a zero reading is NaN, and adds 0 to the lengths below.
     let direction = |column: usize, row: usize| {
         let share = |i: usize| (i as f64 + 0.5) / SIDE as f64;
         let y_m = extent.width_m().map_or(0.0, |width_m| share(row) * width_m);
@@ -187,11 +186,11 @@ fn chance_of_contact(setup: &Setup, cost: f64) -> f64 {
     normal_cdf(-u) + (half / TAU + area * u / TAU.powf(1.5)) * (-0.5 * cost).exp()
 }
 
-/// Measures a case with known or unknown force, and returns the result as a row of the table.
+/// Measures a case, and returns a row of the table.
 fn check(case: &Case, force_n: Option<f64>) -> String {
     let setup = case.bench.setup.clone().with_force(force_n).unwrap();
     let coordinates = 1 + usize::from(setup.surface().extent().width_m().is_some());
-    // A plane has more places, so a contact on it has a greater cost.
+    // A plane has more positions, so a contact on it has a greater cost.
     let cost = contact_cost(unknowns(coordinates, force_n), setup.layout().len(), LINE_PLACES);
     let chance = chance_of_contact(&setup, detection_cost(cost, FalseAlarmRate::DEFAULT));
     let FalseAlarms { beyond_noise, like_contact, outside_model } = false_alarms(case, &setup);
@@ -237,7 +236,7 @@ fn false_alarms_are_as_rare_as_the_rule_says() {
     println!("|---|---|---|---|---|---|---|\n{}", rows.join("\n"));
 }
 
-/// The beam's presses as a recording of raw channels. A seventh of the rows are untouched.
+/// The beam's presses as raw channels; a seventh of the rows are untouched.
 fn force_linear_locator() -> Fitted<ForceLinearLocator> {
     let bench = paper(5e-6, 100);
     let mut recording = bench.simulate(0);
@@ -284,7 +283,8 @@ fn a_force_linear_surface_has_the_rate_that_is_set() {
         };
         let alarms = (0..readings).filter(is_alarm).count();
         println!("force-linear at {share}: {alarms} of {readings}");
-        // The bounds are wider by the posterior variance of noise and offsets, and contacts are evaluated at the nodes of a grid only.
+        // The bounds include the posterior variance of noise and offsets, and contacts are evaluated at grid
+        // nodes only.
         let (least, _) = binomial_bounds(readings, 0.8 * share);
         let (_, most) = binomial_bounds(readings, 1.1 * share);
         assert!((least..=most).contains(&alarms), "{share}: {alarms} not in {least}..={most}");
@@ -364,8 +364,7 @@ fn as_many_readings_as_unknowns_can_be_outside_the_model() {
     }
 }
 
-/// Counts contacts of unknown force anywhere on a bench: those that are `located` or `ambiguous`, and those among them with the whole
-/// surface as interval.
+/// Counts contacts that are `located` or `ambiguous`, and those of them with the whole surface as interval.
 fn left_open(locator: &Locator, bench: &Example, force_n: f64, contacts: usize) -> [usize; 2] {
     let (layout, extent) = (bench.setup.layout(), bench.setup.surface().extent());
     let clean = CleanSensors::new(bench.setup.surface().model().unwrap(), layout);

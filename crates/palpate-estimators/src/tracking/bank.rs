@@ -1,8 +1,7 @@
-//! The state of a surface and its contacts, its transition over a step of time, and its Gaussians under several motions, which mix.
+//! Banks of Gaussians, one per combination of motions.
 //!
-//! The state of a line with C contacts is (u, u̇) and then (x, v, v̇, W) of each contact: N = 2 + 4·C numbers. u = m·ω²·q
-//! is the force of the surface's first mode. The contacts' force on this mode is p = Σ W·φ(x), φ its shape:
-//! ü + 2ζω·u̇ + ω²·u = ω²·p. A surface in balance has u = 0 without variance, and its likelihood does not depend on it.
+//! The state on a line is (u, u̇), then (x, v, v̇, W) per contact. u = m·ω²·q is the force of the first mode
+//! with shape φ: ü + 2ζω·u̇ + ω²·u = ω²·Σ W·φ(x). In balance, u = 0 without variance.
 
 use super::TrackerConfig;
 use super::gaussian::{Gaussian, Transition};
@@ -13,28 +12,23 @@ use palpate_numerics::normal_between;
 use palpate_numerics::small::Matrix;
 use std::f64::consts::PI;
 
-/// Dynamics of the M members of a bank, states of N numbers, over a time step.
+/// M members with N states over a time step.
 pub(super) trait Dynamics<const N: usize, const M: usize> {
-    /// Probability that member `from` becomes member `to`.
     fn transition_probability(&self, from: usize, to: usize) -> f64;
 
-    /// Transition of a belief under the motion of member `member`.
     fn transition(&self, belief: &Gaussian<N>, member: usize) -> Transition<N>;
 }
 
-/// Entries of a state, K of them, that a reading observes.
+/// Observed state entries.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ObservedEntries<const K: usize> {
-    /// Their indices in the state.
     pub entries: [usize; K],
-    /// The least and the greatest that each can be: places lie on the surface, forces press.
+    /// Ranges of positions and pressing forces.
     pub bounds: [(f64, f64); K],
-    /// Which of them are places.
     pub is_place: [bool; K],
 }
 
-/// A Gaussian for each choice of motions, with its share of the probability: N numbers of a state, M = 3^C choices for its
-/// C contacts.
+/// M = 3^C Gaussians for the motions of C contacts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Bank<const N: usize, const M: usize> {
     pub shares: [f64; M],
@@ -42,17 +36,14 @@ pub(super) struct Bank<const N: usize, const M: usize> {
 }
 
 impl<const N: usize, const M: usize> Bank<N, M> {
-    /// A bank with one Gaussian for every choice of motions, with equal shares.
     pub fn uniform(belief: Gaussian<N>) -> Self {
         Self { shares: [1.0 / M as f64; M], members: [belief; M] }
     }
 
-    /// The bank as one Gaussian.
     pub fn mixed(&self) -> Gaussian<N> {
         Gaussian::mixed(self.shares.iter().copied().zip(self.members))
     }
 
-    /// The bank after a step and before its reading.
     pub fn predicted(&self, dynamics: &impl Dynamics<N, M>) -> Self {
         let mut shares = [0.0; M];
         let members = std::array::from_fn(|to| {
@@ -66,8 +57,8 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         Self { shares, members }
     }
 
-    /// Bank after a reading, and the log probability of the reading. The misfit is expanded about `start`, or else the mean, and
-    /// again about the updated mean, if it has moved by more than a part of the reading's own standard deviation.
+    /// Updates by a reading, expanded about `start` or the mean, and again about the updated mean if it moved
+    /// far; returns the log probability.
     pub fn updated<const K: usize>(
         &self,
         observed: &ObservedEntries<K>,
@@ -90,11 +81,9 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         }
     }
 
-    /// Belief before a step, given the belief `later` after it and its reading.
-    ///
-    /// Given the state before the step, the likelihood of later readings is L_j = N_j(x | all)/N_j(x | so far) for any motion before it. Here
-    /// N_j, of motion j in the step, is from Rauch, Tung and Striebel's recursion on the mixture that motion j began with. Each
-    /// member is updated and weighted by L_j as by a reading, so that a variance never grows.
+    /// Given `later` after a step, later readings have the likelihood L_j = N_j(x | all)/N_j(x | so far),
+    /// with N_j of motion j by the Rauch–Tung–Striebel recursion on the mixture from which j began. L_j
+    /// updates each member as a reading, so that variances never increase.
     pub fn smoothed(&self, dynamics: &impl Dynamics<N, M>, later: &Self) -> Self {
         let mut weights = [[0.0; M]; M];
         let mut before = [[Gaussian::default(); M]; M];
@@ -128,7 +117,6 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         Self { shares, members }
     }
 
-    /// The bank of the remaining contacts, without contact `k`.
     pub fn without_contact<const N2: usize, const M2: usize>(&self, k: usize) -> Bank<N2, M2> {
         let below = MOTIONS.pow(k as u32);
         let stay = |i: usize| if i < contact(k) { i } else { i + OF_CONTACT };
@@ -152,7 +140,6 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         Bank { shares, members }
     }
 
-    /// The bank with one contact more, the last; `joined` gives the surface's swing under it.
     pub fn with_contact<const N2: usize, const M2: usize>(
         &self,
         joined: impl Fn(&Gaussian<N>) -> Gaussian<N2>,
@@ -163,7 +150,6 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         }
     }
 
-    /// Mean of the entries that a reading observes, clamped to their bounds.
     fn observed_mean<const K: usize>(&self, observed: &ObservedEntries<K>) -> [f64; K] {
         let mut mean = [0.0; K];
         for (share, member) in self.shares.iter().zip(&self.members) {
@@ -174,7 +160,7 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         std::array::from_fn(|k| observed.held(k, mean[k]))
     }
 
-    /// `None` where the probability of the reading underflows.
+    /// `None` on underflow.
     fn updated_about<const K: usize>(
         &self,
         observed: &ObservedEntries<K>,
@@ -183,8 +169,8 @@ impl<const N: usize, const M: usize> Bank<N, M> {
     ) -> Option<(Self, f64)> {
         let results: [(Gaussian<N>, f64); M] = self.members.map(|member| {
             let (after, evidence) = member.updated(fit, about, &observed.entries);
-            // A normal distribution truncated at bounds has the evidence of the whole one, times its share within the bounds after the reading over
-            // that before.
+            // The evidence of a normal distribution truncated at bounds is that of the whole one, times its
+            // share within the bounds after the reading over that before.
             let shares = observed.log_share_of_forces(&after) - observed.log_share_of_forces(&member);
             (after, evidence + shares)
         });
@@ -195,7 +181,6 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         (best.is_finite() && sum > 0.0).then(|| (after, best + sum.ln()))
     }
 
-    /// The bank with the observed entries clamped to their bounds.
     fn held<const K: usize>(mut self, observed: &ObservedEntries<K>) -> Self {
         for member in &mut self.members {
             for (k, entry) in observed.entries.into_iter().enumerate() {
@@ -206,7 +191,7 @@ impl<const N: usize, const M: usize> Bank<N, M> {
     }
 }
 
-/// The greatest evidence, and each share multiplied by its evidence over the greatest.
+/// Greatest evidence and reweighted shares.
 fn reweighted<const N: usize, const M: usize>(
     shares: &[f64; M],
     results: &[(Gaussian<N>, f64); M],
@@ -216,7 +201,7 @@ fn reweighted<const N: usize, const M: usize>(
 }
 
 impl<const K: usize> ObservedEntries<K> {
-    /// ln of the share of a belief within the bounds of its forces, each force by itself.
+    /// ln of the probability within force bounds.
     fn log_share_of_forces<const N: usize>(&self, belief: &Gaussian<N>) -> f64 {
         let of_entry = |(k, entry): (usize, usize)| {
             let (least, most) = self.bounds[k];
@@ -236,33 +221,28 @@ impl<const K: usize> ObservedEntries<K> {
     }
 }
 
-/// Force of the first mode, and its rate of change.
+/// First mode's force and rate.
 pub(super) const U: usize = 0;
 pub(super) const U_RATE: usize = 1;
-/// Position, speed, acceleration and force, counted from a contact's first entry.
+/// Entries within a contact.
 pub(super) const X: usize = 0;
 pub(super) const V: usize = 1;
 pub(super) const A: usize = 2;
 pub(super) const W: usize = 3;
-/// Position, speed and acceleration.
 const OF_MOTION: usize = 3;
-/// Numbers of a contact.
 pub(super) const OF_CONTACT: usize = 4;
 
-/// Motions of a contact.
 const MOTIONS: usize = 3;
 
-/// First entry of contact `k`.
 pub(super) const fn contact(k: usize) -> usize {
     2 + OF_CONTACT * k
 }
 
-/// Number of contacts in a state of N numbers.
 pub(super) const fn contacts(numbers: usize) -> usize {
     (numbers - 2) / OF_CONTACT
 }
 
-/// Entries of a state on a line that a reading observes: u, then place and force of each contact, K = 1 + 2·C numbers.
+/// u, then position and force of each contact.
 pub(super) fn observed_on_line<const K: usize>(length_m: f64, greatest_n: f64) -> ObservedEntries<K> {
     ObservedEntries {
         entries: std::array::from_fn(|k| match k {
@@ -279,24 +259,24 @@ pub(super) fn observed_on_line<const K: usize>(length_m: f64, greatest_n: f64) -
     }
 }
 
-/// The motion of contact `k` in member `member` of a bank: digit k of the member's number to the base 3.
+/// Digit `k` to the base 3.
 const fn motion_of(member: usize, k: usize) -> usize {
     member / MOTIONS.pow(k as u32) % MOTIONS
 }
 
-/// A step of time.
+/// Time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Step {
     duration_s: f64,
     motions: [Motion; MOTIONS],
-    /// The probability that a motion lasts through the step; the other motions share the rest.
+    /// Probability that a motion lasts.
     lasts: f64,
-    /// Variance that an unknown force gains, over its square.
+    /// Relative variance of an unknown force.
     drift: f64,
     swing: Option<FreeSwing>,
 }
 
-/// Free vibration of (u, u̇) over the step, and the variance that u̇ gains over the square of all forces.
+/// Vibration of (u, u̇), and variance of u̇ over the squared force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct FreeSwing {
     free: [[f64; 2]; 2],
@@ -304,7 +284,6 @@ struct FreeSwing {
 }
 
 impl Step {
-    /// A step; forces drift where they are unknown.
     pub fn new(config: &TrackerConfig, duration_s: f64, forces_known: bool) -> Self {
         let motion = |sd: f64| Motion::new(duration_s, config.acceleration_s, sd);
         Self {
@@ -316,14 +295,13 @@ impl Step {
                 let omega = 2.0 * PI * swing.frequency_hz;
                 FreeSwing {
                     free: Oscillator::new(omega, swing.damping_ratio, duration_s).free(),
-                    // White noise that keeps a damped oscillator at the standard deviation EXCITATION.
+                    // White noise that sustains a damped oscillator at the standard deviation EXCITATION.
                     noise: 4.0 * swing.damping_ratio * omega.powi(3) * EXCITATION * EXCITATION * duration_s,
                 }
             }),
         }
     }
 
-    /// The probability that member `from` of a bank for `contacts` contacts becomes member `to`.
     pub fn transition_probability(&self, contacts: usize, from: usize, to: usize) -> f64 {
         let passes = |k: usize| {
             let stays = motion_of(from, k) == motion_of(to, k);
@@ -332,18 +310,15 @@ impl Step {
         (0..contacts).map(passes).product()
     }
 
-    /// The motion for a digit of a member's number.
     pub fn motion(&self, number: usize) -> &Motion {
         &self.motions[number]
     }
 
-    /// Variance that a force of `force_n` gains.
     pub fn drift_n2(&self, force_n: f64) -> f64 {
         self.drift * force_n.powi(2)
     }
 }
 
-/// A step of contacts on a line.
 #[derive(Clone, Copy)]
 pub(super) struct LineDynamics<'a> {
     step: &'a Step,
@@ -351,7 +326,7 @@ pub(super) struct LineDynamics<'a> {
 }
 
 impl<'a> LineDynamics<'a> {
-    /// A step on a line; `None` on a plane.
+    /// `None` on a plane.
     pub fn new(step: &'a Step, geometry: Geometry<'a>) -> Option<Self> {
         match geometry {
             Geometry::Line(likelihood) => Some(Self { step, likelihood }),
@@ -380,7 +355,7 @@ impl<const N: usize, const M: usize> Dynamics<N, M> for LineDynamics<'_> {
 }
 
 impl LineDynamics<'_> {
-    /// The first mode swings under its force halfway through the step: (u − p, u̇) swings freely.
+    /// (u − p, u̇) vibrates freely, with balance p at half of the step.
     fn swing<const N: usize>(&self, swing: &FreeSwing, belief: &Gaussian<N>, transition: &mut Transition<N>) {
         let half_s = 0.5 * self.step.duration_s;
         let ([[uu, us], [su, ss]], mean) = (swing.free, &belief.mean);
@@ -411,11 +386,10 @@ impl LineDynamics<'_> {
     }
 }
 
-/// Standard deviation of the first mode's force that white noise sustains, as a share of the contacts' force: real presses are less
-/// even than the model.
+/// Sustained first-mode force over the contacts' force: real presses fluctuate.
 const EXCITATION: f64 = 1e-4;
 
-/// Transition of position, speed and acceleration: F and Q.
+/// F and Q of position, speed and acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Motion {
     forward: Matrix<3>,
@@ -423,7 +397,7 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// Writes into `change` the transition of the position, speed and acceleration that begin at entry `at` of a state.
+    /// Writes the entries from `at`.
     pub fn move_along<const N: usize>(
         &self,
         at: usize,
@@ -439,8 +413,7 @@ impl Motion {
         }
     }
 
-    /// A contact with an acceleration of standard deviation `sd`, and a correlation that falls by e in `lasts_s` (R. Singer,
-    /// IEEE Trans. Aerosp. Electron. Syst. 6, 1970).
+    /// Singer model of acceleration (R. Singer, IEEE Trans. Aerosp. Electron. Syst. 6, 1970).
     fn new(duration_s: f64, lasts_s: f64, sd: f64) -> Self {
         let (t, u) = (duration_s, duration_s / lasts_s);
         let e = (-u).exp();
@@ -452,7 +425,7 @@ impl Motion {
             noise[j][i] = noise[i][j];
         };
         if u < 0.05 {
-            // The series of the closed form, where that would lose digits.
+            // Series of the closed form, which would lose digits.
             set(X, X, u.powi(5) / 10.0);
             set(X, V, u.powi(4) / 4.0);
             set(X, A, u.powi(3) / 3.0);
@@ -472,15 +445,13 @@ impl Motion {
     }
 }
 
-/// Numbers of the state of a contact on a plane: (x, v_x, v̇_x, y, v_y, v̇_y, W). Motions along and across have the same law and are
-/// independent; the plane is in balance at every reading.
+/// (x, v_x, v̇_x, y, v_y, v̇_y, W), with independent motions, in balance.
 pub(super) const PLANE_NUMBERS: usize = 7;
-/// First entries of position, speed and acceleration along, of those across, and the entry of the force.
+/// First entries along and across, and force.
 pub(super) const ALONG: usize = 0;
 pub(super) const ACROSS: usize = 3;
 pub(super) const FORCE: usize = 6;
 
-/// Entries of a contact on a plane that a reading observes: x, y and W.
 pub(super) fn observed_on_plane(extent: Extent, greatest_n: f64) -> ObservedEntries<3> {
     let [length_m, width_m] = sides_m(extent);
     ObservedEntries {
@@ -490,7 +461,6 @@ pub(super) fn observed_on_plane(extent: Extent, greatest_n: f64) -> ObservedEntr
     }
 }
 
-/// A step of a contact on a plane.
 #[derive(Clone, Copy)]
 pub(super) struct PlaneDynamics<'a>(pub &'a Step);
 
@@ -509,7 +479,7 @@ impl Dynamics<PLANE_NUMBERS, MOTIONS> for PlaneDynamics<'_> {
     }
 }
 
-/// Length and width, in metres; a line has no width.
+/// In metres; width 0 on a line.
 pub(super) fn sides_m(extent: Extent) -> [f64; 2] {
     [extent.length_m(), extent.width_m().unwrap_or(0.0)]
 }
@@ -524,7 +494,7 @@ mod tests {
             mean: [0.2, 0.5, 1.0],
             covariance: [[4e-6, 1e-6, 1e-5], [1e-6, 1e-2, 1e-3], [1e-5, 1e-3, 4.0]],
         };
-        // On both sides of the switch from the closed form to its first terms.
+        // On both sides of the switch from the closed form to the series.
         for duration_s in [0.2, 9e-3] {
             let moved = |belief: &Gaussian<3>, share: f64| {
                 let Motion { forward, noise } = Motion::new(share * duration_s, 0.1, 2.0);

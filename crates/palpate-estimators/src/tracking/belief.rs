@@ -1,4 +1,4 @@
-//! Belief about a surface with no, one or two contacts; on a plane there is at most one.
+//! Beliefs with up to two contacts.
 
 use super::bank::{
     ACROSS, ALONG, Bank, FORCE, LineDynamics, ObservedEntries, PLANE_NUMBERS, PlaneDynamics, Step, V, W, X,
@@ -8,7 +8,6 @@ use super::gaussian::Gaussian;
 use crate::likelihood::{ContactFit, Geometry, Likelihood, LineLikelihood, PlaneLikelihood};
 use palpate_mechanics::contact::{Contact, Position};
 
-/// A bank of a surface with as many contacts.
 #[derive(Clone, Debug, PartialEq)]
 #[expect(
     clippy::large_enum_variant,
@@ -21,31 +20,29 @@ pub(super) enum Belief {
     OnPlane(Box<Bank<PLANE_NUMBERS, 3>>),
 }
 
-/// A reading with the likelihood of the surface.
 #[derive(Clone, Copy)]
 pub(super) struct Observation<'a> {
     pub likelihood: &'a dyn Likelihood,
     pub whitened: &'a [f64],
-    /// Whether the surface swings.
+    /// True for vibration.
     pub swings: bool,
 }
 
-/// One contact of a belief: mean and variances of position, speed and force, and then of position and speed across, which are 0 on a line.
+/// Position, speed, force, then position and speed across, 0 on a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Moments {
     pub mean: [f64; 5],
     pub variance: [f64; 5],
-    /// Covariance of the positions along and across, in m².
+    /// Along and across, in m².
     pub covariance_m2: f64,
 }
 
 impl Belief {
-    /// An untouched surface at rest.
     pub fn nothing() -> Self {
         Self::Nothing(Bank::uniform(Gaussian::default()))
     }
 
-    /// Becomes the mixture with another belief without contact; `share` is the share of the other.
+    /// Mixes beliefs without contact; `share` is the other's probability.
     pub fn absorb(&mut self, other: &Self, share: f64) {
         if let (Self::Nothing(own), Self::Nothing(other)) = (self, other) {
             let parts = [(1.0 - share, own.mixed()), (share, other.mixed())];
@@ -61,19 +58,18 @@ impl Belief {
         }
     }
 
-    /// The belief after a step and before its reading.
     pub fn predicted(&self, step: &Step, geometry: Geometry) -> Self {
         match (self, LineDynamics::new(step, geometry)) {
             (Self::Nothing(bank), Some(line)) => Self::Nothing(bank.predicted(&line)),
             (Self::One(bank), Some(line)) => Self::One(bank.predicted(&line)),
             (Self::Two(bank), Some(line)) => Self::Two(Box::new(bank.predicted(&line))),
             (Self::OnPlane(bank), _) => Self::OnPlane(Box::new(bank.predicted(&PlaneDynamics(step)))),
-            // An untouched plane in balance stays as it is.
+            // An untouched plane in balance stays unchanged.
             (belief, None) => belief.clone(),
         }
     }
 
-    /// The belief after a reading, and the log probability of the reading; `None` where that probability underflows.
+    /// With the log probability; `None` on underflow.
     pub fn updated(&self, observation: Observation) -> Option<(Self, f64)> {
         match (self, observation.likelihood.geometry()) {
             (Self::Nothing(bank), _) => {
@@ -103,12 +99,12 @@ impl Belief {
                 let updated = bank.updated(&observation.entries_on_plane(), expand, None);
                 updated.map(|(bank, evidence)| (Self::OnPlane(Box::new(bank)), evidence))
             }
-            // A belief of a line does not suit a plane, nor the other way round.
+            // A line's belief does not fit a plane, or vice versa.
             (Self::One(_) | Self::Two(_), Geometry::Plane(_)) | (Self::OnPlane(_), Geometry::Line(_)) => None,
         }
     }
 
-    /// Belief after contact `k` lets go; the surface swings on.
+    /// The vibration continues.
     pub fn without_contact(&self, k: usize) -> Option<Self> {
         match self {
             Self::Nothing(_) => None,
@@ -118,7 +114,7 @@ impl Belief {
         }
     }
 
-    /// The moments of each contact, over all motions.
+    /// Mixed over motions.
     pub fn moments(&self) -> Vec<Moments> {
         match self {
             Self::Nothing(_) => Vec::new(),
@@ -128,7 +124,7 @@ impl Belief {
         }
     }
 
-    /// Belief before a step, given the belief `later` after it, if that has as many contacts.
+    /// `None` for another number of contacts.
     pub fn smoothed(&self, step: &Step, geometry: Geometry, later: &Self) -> Option<Self> {
         match (self, later, LineDynamics::new(step, geometry)) {
             (Self::Nothing(bank), Self::Nothing(later), Some(line)) => {
@@ -147,13 +143,12 @@ impl Belief {
 }
 
 impl Moments {
-    /// The contact at the mean.
     pub fn contact(&self) -> Contact {
         let [x_m, _, force_n, y_m, _] = self.mean;
         Contact { position: Position { x_m, y_m }, force_n }
     }
 
-    /// Whether two are of one contact: within two standard deviations of their difference in place, speed and force.
+    /// Within two standard deviations in position, speed and force.
     pub fn is_same_contact(&self, other: &Self) -> bool {
         const CLOSE: f64 = 2.0;
         (0..self.mean.len()).all(|i| {
@@ -164,17 +159,15 @@ impl Moments {
 }
 
 impl Observation<'_> {
-    /// The greatest force of a contact, in newtons; infinite where the force is known.
+    /// Infinite for a known force.
     fn greatest_force_n(&self) -> f64 {
         self.likelihood.force_range().map_or(f64::INFINITY, |range| range.ends_n().1)
     }
 
-    /// Entries of contacts on a line, with their bounds.
     pub fn entries_on_line<const K: usize>(&self) -> ObservedEntries<K> {
         observed_on_line(self.likelihood.extent().length_m(), self.greatest_force_n())
     }
 
-    /// Entries of a contact on a plane, with their bounds.
     pub fn entries_on_plane(&self) -> ObservedEntries<3> {
         observed_on_plane(self.likelihood.extent(), self.greatest_force_n())
     }
@@ -213,7 +206,6 @@ fn line_moments<const N: usize>(belief: &Gaussian<N>) -> Vec<Moments> {
     (0..contacts(N)).map(of).collect()
 }
 
-/// The contact of a state.
 fn plane_moments(belief: &Gaussian<PLANE_NUMBERS>) -> Moments {
     let entries = [ALONG, ALONG + 1, FORCE, ACROSS, ACROSS + 1];
     Moments {

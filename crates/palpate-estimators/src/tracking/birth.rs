@@ -1,10 +1,10 @@
-//! Contacts that may have come with a reading.
+//! Birth model of contacts.
 //!
-//! A new contact has a wide prior about the places that explain the reading by itself, with any usual speed, on a surface that
-//! hardly swings. The reading then gives its probability and its posterior.
+//! A new contact has a wide prior about the modes of its first reading, at any usual speed, nearly in
+//! balance.
 //!
-//! The force of a contact has the [prior](crate::force_prior) of all estimators. About the force W that fits, a log-normal distribution ln W ~ N(μ, s²) has the density
-//! e^(−q²/2)/(√(2π)·s·W) with q = (ln W − μ)/s: that of a normal distribution with the standard deviation s·W at its mean, times e^(−q²/2).
+//! The [force prior](crate::force_prior) is log-normal, ln W ~ N(μ, s²): about the fitted force W, a normal
+//! density with standard deviation s·W at its mean, times e^(−q²/2) with q = (ln W − μ)/s.
 
 use super::TrackerConfig;
 use super::bank::{
@@ -20,43 +20,43 @@ use palpate_numerics::NORMAL_95;
 use palpate_numerics::small::{principal_direction, principal_variances};
 use std::f64::consts::PI;
 
-/// A valley of a reading's misfit that is wider than this share of the length is divided into parts no wider, since the force changes along it.
+/// Width of a component over the length: the force varies along a wide mode.
 const WIDEST: f64 = 1.0 / 40.0;
-/// The most parts of a valley.
+/// Components of a mode.
 const MOST_PARTS: f64 = 16.0;
-/// Standard deviation of the first mode's force about its balance under a new contact, as a share of the contact's force.
+/// Imbalance of the first mode over the force of a new contact.
 const IMBALANCE: f64 = 0.02;
 
-/// Birth model: the contacts that may have come with one reading; `L` is the likelihood of a line or of a plane.
+/// Births at one reading; `L` is the likelihood of a line or plane.
 pub(super) struct BirthModel<'a, L: ?Sized> {
     pub likelihood: &'a L,
     pub observation: Observation<'a>,
     pub config: &'a TrackerConfig,
-    /// Prior of the force of a contact; `None` where it is known.
+    /// `None` for a known force.
     pub force_prior: Option<&'a ForcePrior>,
     pub single: &'a Estimate,
 }
 
-/// Component of the birth model: a contact that has just come, before its reading.
+/// Before its reading.
 #[derive(Clone, Copy)]
 struct BirthComponent {
     contact: Contact,
-    /// Covariance of the place in m²: xx, xy, yy; on a line xx alone.
+    /// xx, xy, yy in m².
     covariance_m2: [f64; 3],
     variance_n2: f64,
-    /// Prior probability: its share of all places, times the density of its force over that of a normal distribution about it.
+    /// Share of positions, times the force density over a normal one.
     prior: f64,
 }
 
 impl<L: ?Sized> BirthModel<'_, L> {
-    /// The single contacts that explain the reading by itself, one in each valley of its misfit.
+    /// Modes of the reading's likelihood.
     fn modes(&self) -> impl Iterator<Item = &ContactEstimate> {
         let modes = self.single.modes.as_slice().iter().map(|mode| &mode.contact);
         let touched = self.single.status != Status::NoContact;
         std::iter::once(&self.single.contact).chain(modes).filter(move |_| touched)
     }
 
-    /// A contact with this force, or the known one; `None` for a force that does not press.
+    /// `None` for a force that does not press.
     fn component(
         &self,
         position: Position,
@@ -81,21 +81,21 @@ impl<L: ?Sized> BirthModel<'_, L> {
         Some(BirthComponent { contact, covariance_m2, variance_n2, prior: density * prior })
     }
 
-    /// A contact with the variance of a uniform distribution over the surface, l²/12.
+    /// Variance l²/12 of a uniform distribution.
     fn uniform_component(&self, contact: &ContactEstimate) -> Option<BirthComponent> {
         let [xx, yy] = sides_m(self.observation.likelihood.extent()).map(|side_m| side_m.powi(2) / 12.0);
         self.component(contact.position, contact.force_n?, [xx, 0.0, yy], 1.0)
     }
 }
 
-/// The force that fits a place, from a fit of one near it; the force is the third unknown.
+/// Force that fits near a fit, as third unknown.
 fn better_force_n(fit: &ContactFit<3>, near_n: f64) -> f64 {
     let information = fit.information[2][2];
     if information > 0.0 { (near_n + fit.score[2] / information).max(0.0) } else { near_n }
 }
 
 impl BirthModel<'_, dyn LineLikelihood + '_> {
-    /// The contacts that may touch a surface without contacts; each with the log probability of the reading.
+    /// With log probabilities of the reading.
     pub fn first_contacts(&self) -> Vec<(f64, Belief)> {
         if self.single.status == Status::NoContact {
             return Vec::new();
@@ -109,7 +109,6 @@ impl BirthModel<'_, dyn LineLikelihood + '_> {
             .collect()
     }
 
-    /// A second contact beside that of a belief.
     pub fn second_contact(&self, bank: &Bank<6, 3>) -> Option<(f64, Belief)> {
         let (left, right) = self.pair()?;
         let x_m = bank.mixed().mean[contact(0) + X];
@@ -120,7 +119,7 @@ impl BirthModel<'_, dyn LineLikelihood + '_> {
         Some((evidence, Belief::Two(Box::new(bank))))
     }
 
-    /// One contact, updated by the reading; a single motion, as the reading does not determine how it moves on.
+    /// A single motion, because one reading does not determine it.
     fn one_contact(&self, component: BirthComponent) -> Option<(f64, Belief)> {
         let Contact { position, force_n } = component.contact;
         let born: Bank<6, 1> = Bank::uniform(self.augmented(&Gaussian::<2>::default(), component));
@@ -130,7 +129,6 @@ impl BirthModel<'_, dyn LineLikelihood + '_> {
         Some((evidence + component.prior.ln(), Belief::One(Bank::uniform(bank.members[0]))))
     }
 
-    /// Two contacts that come at once, updated by the reading.
     fn two_contacts(&self, first: BirthComponent, second: BirthComponent) -> Option<(f64, Belief)> {
         let one: Gaussian<6> = self.augmented(&Gaussian::<2>::default(), first);
         let born: Bank<10, 1> = Bank::uniform(self.augmented(&one, second));
@@ -138,7 +136,7 @@ impl BirthModel<'_, dyn LineLikelihood + '_> {
         Some((evidence, Belief::Two(Box::new(Bank::uniform(bank.members[0])))))
     }
 
-    /// A bank of two contacts after the reading, with the misfit expanded first about their separate estimates.
+    /// Expanded first about separate estimates.
     fn updated_pair<const M: usize>(
         &self,
         born: &Bank<10, M>,
@@ -151,7 +149,7 @@ impl BirthModel<'_, dyn LineLikelihood + '_> {
         born.updated(&self.observation.entries_on_line(), expand, Some(start))
     }
 
-    /// A belief with its state augmented by a contact. The first mode is nearly in balance under it: u grows by W·φ(x) and its unrest.
+    /// u increases by W·φ(x), with imbalance.
     fn augmented<const N: usize, const N2: usize>(
         &self,
         belief: &Gaussian<N>,
@@ -201,7 +199,7 @@ impl BirthModel<'_, dyn LineLikelihood + '_> {
         contact.force_n * self.likelihood.first_mode(contact.position.x_m)[0]
     }
 
-    /// The two contacts of the single reading's estimate, from left to right.
+    /// From left to right.
     fn pair(&self) -> Option<(BirthComponent, BirthComponent)> {
         let first = self.uniform_component(&self.single.contact)?;
         let second = self.uniform_component(self.single.further.as_slice().first()?)?;
@@ -209,7 +207,6 @@ impl BirthModel<'_, dyn LineLikelihood + '_> {
         Some(if in_order { (first, second) } else { (second, first) })
     }
 
-    /// The components of one mode.
     fn mode_components(&self, contact: &ContactEstimate) -> Vec<BirthComponent> {
         let (Some(force_n), Some(uncertainty)) = (contact.force_n, contact.uncertainty) else {
             return Vec::new();
@@ -232,10 +229,9 @@ impl BirthModel<'_, dyn LineLikelihood + '_> {
     }
 }
 
-/// A contact in each valley of the reading's misfit, with a uniform prior as on a line. A long valley is divided into
-/// parts along its longer axis; across it the reading determines the place.
+/// Wide modes are divided along their longer axis.
 impl BirthModel<'_, dyn PlaneLikelihood + '_> {
-    /// The contacts that may touch a surface without contacts; each with the log probability of the reading.
+    /// With log probabilities of the reading.
     pub fn first_contacts(&self) -> Vec<(f64, Belief)> {
         self.modes()
             .flat_map(|contact| self.mode_components(contact))
@@ -243,7 +239,7 @@ impl BirthModel<'_, dyn PlaneLikelihood + '_> {
             .collect()
     }
 
-    /// A contact, updated by the reading; a single motion, as the reading does not determine how it moves on.
+    /// A single motion, because one reading does not determine it.
     fn one_contact(&self, component: BirthComponent) -> Option<(f64, Belief)> {
         let Contact { position: Position { x_m, y_m }, force_n } = component.contact;
         let mut belief = Gaussian::<PLANE_NUMBERS>::default();
@@ -264,7 +260,6 @@ impl BirthModel<'_, dyn PlaneLikelihood + '_> {
         Some((evidence + component.prior.ln(), Belief::OnPlane(Box::new(Bank::uniform(bank.members[0])))))
     }
 
-    /// The components of one mode.
     fn mode_components(&self, contact: &ContactEstimate) -> Vec<BirthComponent> {
         let (Some(force_n), Some(uncertainty)) = (contact.force_n, contact.uncertainty) else {
             return Vec::new();

@@ -1,20 +1,18 @@
-//! A Gaussian in the state of a surface and its contacts, updated by time and by readings.
+//! Gaussian states.
 //!
-//! Symbols: m mean and P covariance of the state; s the unknowns of a [`ContactFit`], which are entries of the state; g and A pull
-//! and information of the fit.
+//! Symbols: m mean and P covariance; s entries of the unknowns of a [`ContactFit`], with score g and
+//! information A.
 
 use crate::likelihood::ContactFit;
 use palpate_numerics::small::{Ldl, Matrix, dot};
 
-/// Mean and covariance of N numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Gaussian<const N: usize> {
     pub mean: [f64; N],
     pub covariance: Matrix<N>,
 }
 
-/// Transition of a state over a time step, linear about the mean of the belief: the mean becomes `mean`, and P
-/// becomes F·P·Fᵀ + Q.
+/// Linear transition: the mean becomes `mean`, P becomes F·P·Fᵀ + Q.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Transition<const N: usize> {
     pub mean: [f64; N],
@@ -25,7 +23,6 @@ pub(super) struct Transition<const N: usize> {
 }
 
 impl<const N: usize> Transition<N> {
-    /// The transition that does not change a Gaussian.
     pub fn identity(belief: &Gaussian<N>) -> Self {
         let mut transition = Self { mean: belief.mean, forward: [[0.0; N]; N], noise: [[0.0; N]; N] };
         (0..N).for_each(|i| transition.forward[i][i] = 1.0);
@@ -51,7 +48,6 @@ impl<const N: usize> Default for Gaussian<N> {
 }
 
 impl<const N: usize> Gaussian<N> {
-    /// The Gaussian after a step of time.
     pub fn predicted(&self, transition: &Transition<N>) -> Self {
         let carried = transition.carried(&self.covariance);
         let mut covariance = transition.noise;
@@ -63,11 +59,10 @@ impl<const N: usize> Gaussian<N> {
         Self { mean: transition.mean, covariance }
     }
 
-    /// Belief after a reading, with the misfit in the entries `entries` expanded about `about`; and the log probability of the
-    /// reading.
+    /// Updates by a reading, expanded about `about`; returns the log probability.
     ///
-    /// P⁺ = P − Y·G⁻¹·Yᵀ with Y = P_s·R, A = R·Rᵀ and G = 1 + Rᵀ·P_ss·R; m⁺ = m + P⁺_s·(g − A·δ), δ the distance of the
-    /// mean from `about`. The log evidence is −½·(ln det G + χ² less the reduction by the move).
+    /// P⁺ = P − Y·G⁻¹·Yᵀ with Y = P_s·R, A = R·Rᵀ and G = 1 + Rᵀ·P_ss·R; m⁺ = m + P⁺_s·(g − A·δ), with δ the
+    /// mean minus `about`. The log evidence is −½·(ln det G + χ²), with χ² reduced by the move.
     pub fn updated<const K: usize>(
         &self,
         fit: &ContactFit<K>,
@@ -102,7 +97,7 @@ impl<const N: usize> Gaussian<N> {
         (after, -0.5 * (grown.log_determinant() + misfit - explained))
     }
 
-    /// The Gaussian with the mean and covariance of a mixture; shares add up to 1.
+    /// Mixture moments; shares sum to 1.
     pub fn mixed(parts: impl Iterator<Item = (f64, Self)> + Clone) -> Self {
         let mut all = Self::default();
         for (share, part) in parts.clone() {
@@ -119,8 +114,8 @@ impl<const N: usize> Gaussian<N> {
         all
     }
 
-    /// Belief before a step, given the belief `later` after it (Rauch, Tung and Striebel 1965):
-    /// m + C·(m′ − m⁻) and P + C·(P′ − P⁻)·Cᵀ with C = P·Fᵀ·(P⁻)⁻¹, where an entry that is known exactly keeps its value.
+    /// Rauch–Tung–Striebel (1965): m + C·(m′ − m⁻) and P + C·(P′ − P⁻)·Cᵀ with C = P·Fᵀ·(P⁻)⁻¹; exact entries
+    /// stay.
     pub fn smoothed(&self, transition: &Transition<N>, later: &Self) -> Self {
         let expected = self.predicted(transition);
         let carried = transition.carried(&self.covariance);
@@ -142,8 +137,8 @@ impl<const N: usize> Gaussian<N> {
         before
     }
 
-    /// Information beyond another Gaussian that this one was updated from, as the fit of the readings between, and the point about which it is
-    /// expanded. The precision is P⁻¹ less the other's; at m the pull is the other's P⁻¹·(m − m₀). A number without variance has no precision.
+    /// Information gained since `other`, with its point of expansion: precision P⁻¹ − P₀⁻¹, score P₀⁻¹·(m −
+    /// m₀) at m. Entries without variance have no precision.
     pub fn information_beyond(&self, other: &Self) -> (ContactFit<N>, [f64; N]) {
         let [own, before] = [self, other].map(|belief| Ldl::semidefinite(&belief.covariance).inverse());
         let moved: [f64; N] = std::array::from_fn(|i| self.mean[i] - other.mean[i]);
@@ -157,7 +152,7 @@ impl<const N: usize> Gaussian<N> {
 mod tests {
     use super::*;
 
-    /// Place, speed and force.
+    /// Position, speed and force.
     const BELIEF: Gaussian<3> = Gaussian {
         mean: [0.2, 0.5, 3.0],
         covariance: [[4e-6, 1e-6, 1e-4], [1e-6, 1e-2, 2e-4], [1e-4, 2e-4, 0.04]],

@@ -1,26 +1,13 @@
-//! Moving contacts: a Bayesian filter over position, speed and force, and a smoother over the whole recording.
+//! Tracking of moving contacts: Bayesian filter and smoother.
 //!
-//! The hidden state is how many contacts touch, where, how fast and how hard each does, and how the surface swings. The belief
-//! is a few weighted hypotheses: no contact, one or two, which came at some time and have moved since. A
-//! hypothesis is a bank of Gaussians in the joint state of surface and contacts, one for each choice of a few motions from
-//! steady to brisk, which mix as motions change (interacting multiple models: H. Blom and Y. Bar-Shalom, IEEE Trans. Autom.
-//! Control 33, 1988). A reading updates them by its likelihood, expanded about their predicted places (an iterated
-//! extended Kalman filter), and weights them by how well they explain it. Hypotheses are born at every place that explains the
-//! reading by itself, so a mirror image or a wide valley becomes several of them (a Gaussian sum: D. Alspach and H. Sorenson, same
-//! Trans. 17, 1972). A second contact is born beside the one that is tracked. Each contact of a hypothesis may let go,
-//! which makes another hypothesis. Hypotheses that readings contradict lose weight and are dropped.
+//! Weighted hypotheses of up to two contacts are banks of Gaussians in the joint state of surface and
+//! contacts, one per combination of motions (interacting multiple models: H. Blom and Y. Bar-Shalom, IEEE
+//! Trans. Autom. Control 33, 1988). Readings update and weight them (iterated extended Kalman filter). Births
+//! are at modes of a reading's likelihood (Gaussian sum: D. Alspach and H. Sorenson, same Trans. 17, 1972).
 //!
-//! A surface that swings adds two numbers to the state, the force of its first mode and its rate of change. The contacts
-//! drive them; they affect only the readings, and outlast the contacts.
+//! A vibrating surface adds its first mode's force and rate. A plane has one contact, in balance.
 //!
-//! A grid of positions and speeds that resolves a track would have some 10⁵ cells. Within a valley of the
-//! likelihood a Gaussian is a good approximation, as soon as a contact has lasted for some readings.
-//!
-//! On a plane there is one contact. Its motions along and across are alike and independent, and the surface
-//! is modelled in balance; the rest is as on a line.
-//!
-//! The smoother updates a hypothesis backwards in time with the later readings, by the recursion of H. Rauch, F. Tung and C. Striebel (AIAA Journal
-//! 3, 1965) for each motion.
+//! The smoother is that of H. Rauch, F. Tung and C. Striebel (AIAA Journal 3, 1965), for each motion.
 
 mod bank;
 mod belief;
@@ -41,42 +28,42 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::{NORMAL_95, bisect, clamped_interval, normal_cdf, normal_interval_95};
 
-/// Configuration of a tracker: how contacts come, move and go, and how the surface swings.
+/// Configuration of a tracker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackerConfig {
-    /// Motions from steady to brisk: standard deviation of the acceleration, in m/s².
+    /// Acceleration standard deviations of slow to fast motions, in m/s².
     pub accelerations_m_per_s2: [f64; 3],
-    /// Correlation time of the acceleration, in seconds: its correlation falls by e in that time.
+    /// Acceleration correlation time, in seconds.
     pub acceleration_s: f64,
-    /// Mean time that a contact keeps to one of the motions, in seconds.
+    /// Mean duration of a motion, in seconds.
     pub motion_s: f64,
-    /// Standard deviation of the speed of a contact that has just come, in m/s.
+    /// Standard deviation of a new contact's speed.
     pub speed_sd_m_per_s: f64,
-    /// Drift of an unknown force in a second, as a share of it.
+    /// Relative force drift in a second.
     pub force_drift: f64,
-    /// Rate, a second, at which a contact comes on an untouched surface, and at which one goes.
+    /// Rate of births, and of ends, in 1/s.
     pub changes_per_s: f64,
-    /// Rate, a second, at which a contact goes and is at once somewhere else.
+    /// Rate of jumps to another place, in 1/s.
     pub jumps_per_s: f64,
-    /// First mode of the surface, where it is known; else the surface is assumed to be in balance.
+    /// First mode; `None` in balance.
     pub swing: Option<Swing>,
-    /// Drift of the channels; `None` tracks a drift only if the untouched rows of the calibration show one.
+    /// Channel drift; `None` tracks it only if untouched calibration rows drift.
     pub drift: Option<Drift>,
-    /// Creep of the surface; `None` without creep.
+    /// Surface creep.
     pub creep: Option<Creep>,
 }
 
-/// The first mode of a surface that swings.
+/// First mode of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Swing {
-    /// Natural frequency, in hertz; greater than 0.
+    /// Natural frequency in hertz, positive.
     pub frequency_hz: f64,
-    /// The share of its critical damping, at least 0 and below 1.
+    /// Damping ratio, at least 0, below 1.
     pub damping_ratio: f64,
 }
 
 impl Default for TrackerConfig {
-    /// For hands, robots and wheels up to some metres a second.
+    /// For hands, robots and wheels, up to some m/s.
     fn default() -> Self {
         Self {
             accelerations_m_per_s2: [0.03, 0.6, 6.0],
@@ -93,79 +80,78 @@ impl Default for TrackerConfig {
     }
 }
 
-/// Least share of the probability from which on one hypothesis gives the result alone.
+/// Probability of a hypothesis that gives the result alone.
 const SURE: f64 = 0.98;
 
-/// State of all contacts at one reading.
+/// State at one reading.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
-    /// Time of the reading, in seconds.
+    /// Time in seconds.
     pub time_s: f64,
-    /// The probabilities of no contact, one contact and two.
+    /// Probabilities of no, one and two contacts.
     pub numbers: [f64; 3],
-    /// The contacts, as many as is most probable. Each keeps its place in the list while it is tracked.
+    /// Contacts in persistent order.
     pub contacts: Vec<Tracked>,
-    /// Estimate from this reading only.
+    /// Single estimate.
     pub single: Estimate,
 }
 
-/// A contact that is tracked.
+/// Tracked contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracked {
-    /// Position along the surface, in metres.
+    /// Position in metres.
     pub x_m: f64,
-    /// Speed along the surface, in m/s.
+    /// Speed in m/s.
     pub speed_m_per_s: f64,
-    /// Force, in newtons.
+    /// Force in newtons.
     pub force_n: f64,
-    /// Standard deviations of the three; those of position and force include the calibration's uncertainty.
+    /// Standard deviations, with calibration uncertainty of position and force.
     pub sd: [f64; 3],
-    /// The 95 % interval of the position, in metres.
+    /// 95 % interval of position.
     pub x_95_m: (f64, f64),
-    /// The 95 % interval of the force in newtons, where the calibration's variance of the force exceeds that of the readings. Beside an end force
-    /// and place trade off, so that the logarithm of the force is normal. `None` where the force itself is normal.
+    /// 95 % interval of a log-normal force, by force–position trade-off; `None` if normal.
     pub force_95_n: Option<(f64, f64)>,
-    /// Position and speed across a plane; `None` on a line.
+    /// Motion across a plane.
     pub across: Option<Across>,
 }
 
-/// Position and speed of a tracked contact across a plane.
+/// Motion across a plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Across {
-    /// Position, in metres.
+    /// Position in metres.
     pub y_m: f64,
-    /// Speed across, in m/s.
+    /// Speed in m/s.
     pub speed_m_per_s: f64,
-    /// Standard deviations of the two; the position's includes the calibration's uncertainty.
+    /// Standard deviations, with calibration uncertainty of the position.
     pub sd: [f64; 2],
-    /// The 95 % interval of y, in metres.
+    /// 95 % interval of y.
     pub y_95_m: (f64, f64),
     /// Covariance of x and y, in m².
     pub covariance_m2: f64,
 }
 
-/// A reading that cannot be tracked.
+/// Invalid reading.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum TrackError {
-    /// The time is not later than that of the reading before.
+    /// Times do not increase.
     #[error("the reading is of {time_s} s; it must be later than the previous one, of {before_s} s")]
     Time {
-        /// Time, in seconds.
+        /// Time in seconds.
         time_s: f64,
-        /// Time of the reading before, in seconds.
+        /// Previous time.
         before_s: f64,
     },
 }
 
 impl Track {
-    /// The probability of at least one contact.
+    /// Probability of contact.
     pub fn touching(&self) -> f64 {
         (self.numbers[1] + self.numbers[2]).clamp(0.0, 1.0)
     }
 }
 
 impl Tracked {
-    /// The contact as the estimate of a single reading, with a covariance of 0 between position and force.
+    /// The contact as an estimate, without covariance of position and force.
     pub fn estimate(&self) -> ContactEstimate {
         let [sd_m, _, sd_n] = self.sd;
         let (y_m, y_95_m, xy, yy) = self.across.map_or((0.0, (0.0, 0.0), 0.0, 0.0), |across| {
@@ -184,12 +170,12 @@ impl Tracked {
         }
     }
 
-    /// The 95 % interval of the force, in newtons: [`force_95_n`](Self::force_95_n), or that of a normal distribution.
+    /// 95 % interval of the force in newtons.
     pub fn force_interval_95_n(&self) -> (f64, f64) {
         self.force_95_n.unwrap_or_else(|| force_interval_95_n(self.force_n, self.sd[2]))
     }
 
-    /// The contacts of beliefs with as many of them, each with its weight, the most probable first.
+    /// Beliefs with equal numbers of contacts, the most probable first.
     fn from_mixture(beliefs: &[(f64, Vec<Moments>)], likelihood: &dyn Likelihood) -> Vec<Self> {
         let Some((weight, best)) = beliefs.first() else { return Vec::new() };
         let sum: f64 = beliefs.iter().map(|(weight, _)| weight).sum();
@@ -210,7 +196,6 @@ impl Tracked {
         all
     }
 
-    /// The contacts of one belief.
     fn from_belief(belief: &[Moments], likelihood: &dyn Likelihood) -> Vec<Self> {
         let contacts: Vec<_> = belief.iter().map(Moments::contact).collect();
         let left = likelihood.calibration_variance(&contacts);
@@ -240,7 +225,7 @@ impl Tracked {
 }
 
 impl Tracked {
-    /// Widens contacts as the check of the locator's intervals does.
+    /// As the locator's interval check.
     fn widen_by_check(tracked: &mut [Self], likelihood: &dyn Likelihood) {
         let Some(check) = likelihood.interval_check() else { return };
         let EstimateWidening { position, force } = check.widening();
@@ -251,7 +236,7 @@ impl Tracked {
                 let more = position.factor * position.factor - 1.0;
                 (position.added_variance(across.sd[0].powi(2)), more * across.covariance_m2)
             });
-            // A force that is known has no error.
+            // A known force has no error.
             let force_n2 = if sd_n > 0.0 { force.added_variance(sd_n * sd_n) } else { 0.0 };
             one.widen(
                 [position.added_variance(sd_m * sd_m), xy, yy, force_n2],
@@ -261,7 +246,7 @@ impl Tracked {
         }
     }
 
-    /// Adds variances of the place, xx, xy and yy, and of the force, on a surface of this extent, with contacts up to a greatest force.
+    /// Adds variances of position and force.
     fn widen(&mut self, [xx, xy, yy, force]: [f64; 4], extent: Extent, greatest_n: f64) {
         let wider = |at_m: f64, (low_m, high_m): (f64, f64), variance: f64, side_m: f64| {
             let half = |own_m: f64| (own_m * own_m + NORMAL_95 * NORMAL_95 * variance).sqrt();
@@ -281,8 +266,7 @@ impl Tracked {
     }
 }
 
-/// The 95 % interval of a force that trades off against the place, so that its logarithm is normal, or that ends at the greatest force; `None`
-/// for a normal force.
+/// Log-normal or clipped force; `None` if normal.
 fn force_interval_n(force_n: f64, sd_n: f64, trades_off: bool, greatest_n: f64) -> Option<(f64, f64)> {
     let most_n = greatest_n.max(force_n);
     if trades_off && force_n > 0.0 {
@@ -293,7 +277,7 @@ fn force_interval_n(force_n: f64, sd_n: f64, trades_off: bool, greatest_n: f64) 
     (high_n > most_n).then_some((low_n, most_n))
 }
 
-/// The most probable contact of a plane, with the covariance about it of all hypotheses.
+/// Covariance of all hypotheses about the most probable contact.
 fn spread(best: &Moments, beliefs: &[(f64, Vec<Moments>)], sum: f64) -> Moments {
     let mut spread = Moments { variance: [0.0; 5], covariance_m2: 0.0, ..*best };
     for (weight, one) in beliefs.iter().filter_map(|(weight, contacts)| Some((weight, contacts.first()?))) {
@@ -306,7 +290,7 @@ fn spread(best: &Moments, beliefs: &[(f64, Vec<Moments>)], sum: f64) -> Moments 
     spread
 }
 
-/// The 95 % interval of a mixture of normal distributions: share, mean and standard deviation of each.
+/// Mixture of normal distributions: share, mean, standard deviation.
 fn interval(parts: &[(f64, f64, f64)], length_m: f64) -> (f64, f64) {
     let below = |x_m: f64| -> f64 {
         parts.iter().map(|(share, mean, sd)| share * normal_cdf((x_m - mean) / sd)).sum()

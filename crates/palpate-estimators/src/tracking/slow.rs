@@ -1,24 +1,22 @@
-//! Drift of the channels' offsets and creep of the surface, in the state beside the contacts.
+//! Channel drift and surface creep.
 //!
-//! Symbols, all in standard deviations of each channel's noise: y a reading less the offsets that calibration learnt; h(θ) that of the contacts, θ their places and unknown
-//! forces; d the drift and v its rate; z the creep's state and c its share, τ its time; n white noise of variance 1.
+//! Symbols, over each channel's noise: y reading minus calibrated offsets, h(θ) contacts' reading, d drift
+//! with rate v, z creep state with share c and time τ, n white noise.
 //!
 //!   y = s + c·z + d + n,  s = h(θ),  τ·ż = s − z,  ḋ = v + w·ξ,  v̇ = −v/τ_v + r·√(2/τ_v)·η
 //!
-//! with ξ and η white. A fresh press reads s, which is what calibration learns. Under a constant press the reading grows by c·s, and the remainder
-//! fades after the release (the standard linear solid: W. N. Findley and others, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976,
-//! chapter 5).
+//! with ξ and η white. Calibration learns s, the fresh reading (standard linear solid: W. N. Findley and
+//! others, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976, chapter 5).
 //!
-//! **Creep** needs no contact: between two readings, a = 1 − exp(−T/τ) apart, z goes a of its way to s, so y less drift gives
-//! s = (y − c·(1 − a)·z)/(1 + c·a), channel by channel, and s is what is tracked.
+//! **Creep**: in a step T, z moves by the share a = 1 − exp(−T/τ) to s, so s = (y − d − c·(1 − a)·z)/(1 +
+//! c·a).
 //!
-//! **Drift** follows from what contacts do not explain. Where contacts touch, a drift along ∂h/∂θ cannot be distinguished from their motion. So
-//! each block's θ is treated as unknown, and only the part across determines d (a flat prior of θ, as in the consider filter of S. F. Schmidt,
-//! Application of State-Space Methods to Navigation Problems, 1966). The part along is predicted by v, and its uncertainty is added to that of the
-//! contacts: the covariance of d, projected on θ by least squares, is added to theirs, as it does not average out.
+//! **Drift** along ∂h/∂θ is unidentifiable. Each block's θ has a flat prior (consider filter: S. F. Schmidt,
+//! Application of State-Space Methods to Navigation Problems, 1966); the covariance of d, projected on θ, is
+//! added to that of contacts.
 //!
-//! The size of the drift is learnt: nine filters, of three walks w and three rates r, run beside one another, weighted by their likelihoods of the
-//! untouched readings (D. T. Magill, IEEE Trans. Autom. Control 10, 1965).
+//! Nine filters, three walks w times three rates r, are weighted by untouched readings (D. T. Magill, IEEE
+//! Trans. Autom. Control 10, 1965).
 
 use super::Tracked;
 use crate::likelihood::{Likelihood, Linearisation};
@@ -28,19 +26,19 @@ use palpate_mechanics::contact::{Contact, Position};
 use palpate_numerics::small::{Ldl, Matrix, dot, form};
 use palpate_numerics::{Cholesky, push_rest};
 
-/// Drift of the offsets in the tracker's model, in standard deviations of each channel's noise.
+/// Drift of offsets, in units of the noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
-    /// Candidate random walks, by their standard deviation after a second.
+    /// Candidate random walks, standard deviation after a second.
     pub walks_per_root_s: [f64; 3],
-    /// Candidate rates, by their standard deviation, a second.
+    /// Candidate standard deviations of the rate, in 1/s.
     pub rates_per_s: [f64; 3],
     /// Correlation time of the rate, in seconds.
     pub rate_s: f64,
 }
 
 impl Drift {
-    /// The drift with a greatest walk of at least this many standard deviations of the noise after a second.
+    /// Greatest walk of at least `walk_per_root_s`.
     pub(super) fn up_to(walk_per_root_s: f64) -> Self {
         let mut drift = Self::default();
         let [.., greatest] = &mut drift.walks_per_root_s;
@@ -50,7 +48,7 @@ impl Drift {
 }
 
 impl Default for Drift {
-    /// Walks and rates of up to a tenth of the noise in a second; rates are correlated over some minutes.
+    /// Up to a tenth of the noise in a second; rates correlate over minutes.
     fn default() -> Self {
         Self { walks_per_root_s: [1e-3, 0.01, 0.1], rates_per_s: [0.0, 0.01, 0.1], rate_s: 300.0 }
     }
@@ -59,31 +57,30 @@ impl Default for Drift {
 /// Creep of a soft surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Creep {
-    /// Growth of a reading under a constant press, as a share of that of a fresh press: 0 to 1.
+    /// Final growth over the fresh reading, 0 to 1.
     pub share: f64,
-    /// Time in which all but an e-th of it has come, in seconds; greater than 0.
+    /// Time constant in seconds, positive.
     pub time_s: f64,
 }
 
-/// Time of the readings that are one observation of the drift, in seconds.
+/// Duration of an observation.
 const BLOCK_S: f64 = 0.2;
-/// Longest time that a drift grows without observations, in seconds; a longer silence makes it no more uncertain.
+/// Longest prediction without observations.
 const UNSEEN_S: f64 = 600.0;
-/// Variance along the contacts' unknowns, over that of the noise: flat.
+/// Prior variance of θ over the noise.
 const FLAT: f64 = 1e8;
-/// Share of a derivative that has to lie across the others for it to count.
+/// Least independent share of a derivative.
 const PARALLEL: f64 = 1e-9;
-/// Blocks over which the calibration's error of a contact is the same, so that together they determine no more than one does.
+/// Blocks with a common calibration error, with the information of one.
 const ALIKE: f64 = 300.0;
-/// Share of a filter's evidence that is kept from block to block: some minutes.
+/// Evidence kept per block, some minutes.
 const KEPT: f64 = 0.999;
-/// Least probability of the number of contacts for a reading to update the drift.
+/// Least probability of the number for an update.
 const SURE: f64 = 0.95;
 
-/// State of drift and creep.
 #[derive(Clone, Debug)]
 pub(super) struct SlowState {
-    /// Channel and noise of each whitened value.
+    /// Channel and noise per value.
     noise: Vec<(usize, f64)>,
     drift: Option<DriftFilter>,
     creep: Option<(Creep, Vec<f64>)>,
@@ -91,15 +88,13 @@ pub(super) struct SlowState {
     time_s: f64,
 }
 
-/// Readings of one observation.
 #[derive(Clone, Debug, Default)]
 struct Block {
     count: f64,
     start_s: f64,
     times_s: f64,
-    /// Sum of the offsets of these readings.
     offsets: Vec<f64>,
-    /// Sums of x, y and force of each contact.
+    /// x, y and force of each contact.
     contacts: Vec<[f64; 3]>,
 }
 
@@ -107,15 +102,14 @@ struct Block {
 struct DriftFilter {
     config: Drift,
     models: Vec<Model>,
-    /// Time of the means, in seconds; `None` before the first block.
     time_s: Option<f64>,
-    /// d, v and the covariance of d over all models.
+    /// d, v and covariance of d.
     offset: Array1<f64>,
     rate: Array1<f64>,
     covariance: Array2<f64>,
 }
 
-/// Filter of one walk and one rate: (d, v) of every channel, in that order.
+/// One walk and rate, with state (d, v).
 #[derive(Clone, Debug)]
 struct Model {
     walk: f64,
@@ -126,7 +120,6 @@ struct Model {
 }
 
 impl SlowState {
-    /// The state before the first reading; `channels` is the number of channels.
     pub fn new(
         likelihood: &dyn Likelihood,
         channels: usize,
@@ -159,7 +152,7 @@ impl SlowState {
         }
     }
 
-    /// Subtracts drift and creep from a reading at `time_s`, `duration_s` after the one before: from its whitened values and from itself.
+    /// Corrects a reading and its whitened values.
     pub fn take_off(
         &mut self,
         time_s: f64,
@@ -174,7 +167,7 @@ impl SlowState {
                 *value -= drift.offset_at(i, time_s);
             }
             if let Some((Creep { share, time_s }, states)) = &mut self.creep {
-                // The surface counts as untouched for a long time before the first reading.
+                // The surface is assumed untouched long before the first reading.
                 let way = duration_s.map_or(0.0, |duration_s| -(-duration_s / *time_s).exp_m1());
                 let state = &mut states[i];
                 *value = (*value - *share * (1.0 - way) * *state) / (1.0 + *share * way);
@@ -185,7 +178,7 @@ impl SlowState {
         }
     }
 
-    /// Updates the drift by a reading less drift and creep, under these contacts; `probability` is that of their number.
+    /// Updates by a corrected reading; `probability` is that of the number of contacts.
     pub fn learn(
         &mut self,
         likelihood: &dyn Likelihood,
@@ -213,12 +206,11 @@ impl SlowState {
         );
     }
 
-    /// Covariance of the drift, in units of the noise; `None` where the drift is not tracked.
+    /// Over the noise.
     pub fn drift_covariance(&self) -> Option<&Array2<f64>> {
         self.drift.as_ref().map(|drift| &drift.covariance)
     }
 
-    /// Adapts to a baseline of the readings that has moved by `by` in each channel.
     pub fn move_baseline(&mut self, by: &[f64]) {
         let Some(drift) = &mut self.drift else { return };
         let moved: Vec<f64> = self.noise.iter().map(|(channel, noise)| by[*channel] / noise).collect();
@@ -239,7 +231,7 @@ impl SlowState {
     }
 }
 
-/// Channel and noise of each whitened value: whitening is affine, so that a unit more in a channel is 1/noise more in its value.
+/// Whitening is affine: 1 in a channel adds 1/noise.
 fn noise(likelihood: &dyn Likelihood, channels: usize) -> Vec<(usize, f64)> {
     let (mut reading, mut from, mut to) = (vec![0.0; channels], Vec::new(), Vec::new());
     likelihood.whiten(&reading, &mut from);
@@ -287,7 +279,7 @@ impl Block {
 }
 
 impl DriftFilter {
-    /// A filter of offsets with these initial standard deviations, in units of the noise, and at least 1.
+    /// Initial standard deviations over the noise, at least 1.
     fn new(config: Drift, offset_sd: &[f64]) -> Self {
         let channels = offset_sd.len();
         let variance = |i: usize| offset_sd[i].powi(2).max(1.0);
@@ -307,13 +299,12 @@ impl DriftFilter {
         }
     }
 
-    /// d of a channel at an instant.
     fn offset_at(&self, i: usize, time_s: f64) -> f64 {
         let since_s = self.time_s.map_or(0.0, |own_s| (time_s - own_s).clamp(0.0, UNSEEN_S));
         self.offset[i] + since_s * self.rate[i]
     }
 
-    /// Uses the mean of a block of readings as an observation of d, except along the contacts' unknowns.
+    /// Ignores d along θ.
     fn observe(&mut self, likelihood: &dyn Likelihood, block: &Block) {
         let mean = |sum: f64| sum / block.count;
         let time_s = mean(block.times_s);
@@ -356,7 +347,6 @@ impl DriftFilter {
         }
     }
 
-    /// Mean and covariance over all models.
     fn mix(&mut self) {
         let channels = self.offset.len();
         let best = self.models.iter().map(|model| model.log_weight).fold(f64::NEG_INFINITY, f64::max);
@@ -378,7 +368,7 @@ impl DriftFilter {
     }
 }
 
-/// Adds the uncertainty by a drift of this covariance to that of the contacts.
+/// Adds the uncertainty by drift.
 pub(super) fn widen(covariance: &Array2<f64>, likelihood: &dyn Likelihood, tracked: &mut [Tracked]) {
     let contacts: Vec<Contact> = tracked.iter().map(contact_of).collect();
     let greatest_n = likelihood.force_range().map_or(f64::INFINITY, |range| range.ends_n().1);
@@ -389,7 +379,7 @@ pub(super) fn widen(covariance: &Array2<f64>, likelihood: &dyn Likelihood, track
     }
 }
 
-/// A⁻¹·Jᵀ·P·J·A⁻¹ with A = JᵀJ, J the derivatives by the contacts' unknowns and P the covariance of d.
+/// A⁻¹·Jᵀ·P·J·A⁻¹ with A = JᵀJ, J = ∂h/∂θ and P the covariance of d.
 fn covariance_of_contacts(covariance: &Array2<f64>, at: &Linearisation) -> Matrix<6> {
     let (mut a, mut b) = ([[0.0; 6]; 6], [[0.0; 6]; 6]);
     let mut added = [[0.0; 6]; 6];
@@ -418,7 +408,6 @@ fn covariance_of_contacts(covariance: &Array2<f64>, at: &Linearisation) -> Matri
 }
 
 impl Model {
-    /// Predicts the state after a time.
     fn predict(&mut self, duration_s: f64, rate_s: f64) {
         let channels = self.mean.len() / 2;
         let (d, v) = (s![..channels], s![channels..]);
@@ -440,7 +429,7 @@ impl Model {
         self.covariance.slice_mut(dv).assign(&moved);
         self.covariance.slice_mut(vd).assign(&moved.t());
         self.covariance.slice_mut(vv).mapv_inplace(|rates| stays * stays * rates);
-        // The rate's process noise in the step, as if it were spread evenly.
+        // Process noise of the rate in the step, approximated as uniform.
         let unrest = self.rate * self.rate * (1.0 - stays * stays);
         for i in 0..channels {
             let at = channels + i;
@@ -452,8 +441,7 @@ impl Model {
         }
     }
 
-    /// Updates d by an observation with its noise; returns the log probability of the observation. `None`, without an update, for one that is too far
-    /// off.
+    /// Log probability; `None`, without update, for an outlier.
     fn update(&mut self, shown: &Array1<f64>, noise: &Array2<f64>) -> Option<f64> {
         let channels = shown.len();
         let off = shown - &self.mean.slice(s![..channels]);
@@ -480,7 +468,7 @@ mod tests {
     use crate::likelihood::CalibrationVariance;
     use palpate_mechanics::surface::Extent;
 
-    /// A channel by itself, without a rate: the steady variance of a random walk in noise is (√(q² + 4·q·r) − q)/2.
+    /// Steady variance of a random walk in noise: (√(q² + 4·q·r) − q)/2.
     #[test]
     fn a_walk_s_variance_is_that_of_the_steady_filter() {
         let (walk, noise, every_s) = (0.3, 0.05, 0.2);
@@ -497,7 +485,7 @@ mod tests {
         assert!((model.covariance[[0, 0]] / steady - 1.0).abs() < 1e-9);
     }
 
-    /// d after a time is the integral of v, and its variance grows by that of v: against small steps.
+    /// d integrates v.
     #[test]
     fn one_long_step_is_many_short_ones() {
         let start = || {
@@ -524,7 +512,7 @@ mod tests {
         let mut offset = [0.0; 3];
         for i in 0..600_u32 {
             let time_s = 0.2 * f64::from(i);
-            // Noise of a mean of 20 that is never twice the same.
+            // Noise of a mean of 20 that never repeats.
             let noise = |c: u32| 0.2 * (f64::from((i * (7 + 3 * c)) % 101) / 50.0 - 1.0);
             offset = [0.02, -0.02, 0.0].map(|rate| rate * time_s);
             let offsets = (0..3).map(|c| 20.0 * (offset[c as usize] + noise(c))).collect();
@@ -567,7 +555,6 @@ mod tests {
         }
     }
 
-    /// Readings that are whitened already, on an untouched surface.
     struct Nothing(usize);
 
     impl Likelihood for Nothing {

@@ -1,4 +1,4 @@
-//! The paper's beam, in balance under a contact that moves, lets go and comes down again.
+//! The paper's beam in balance, under a contact that moves, ends and returns.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -54,7 +54,7 @@ pub(super) fn timed_readings(rig: &Example, motion: Motion, force_n: f64, seed: 
     (0..(motion.duration_s() * RATE_HZ) as usize).map(at).collect()
 }
 
-/// Number of readings with a wrong detection: a contact where there is none, or the other way round.
+/// Number of readings with a missed or false detection.
 pub(super) fn wrongly_touching(likelihood: impl Likelihood + 'static, readings: &[Timed]) -> usize {
     let mut tracker = Tracker::new(Arc::new(likelihood), TrackerConfig::default());
     let mut wrong = 0;
@@ -71,8 +71,8 @@ fn readings(rig: &Example, motion: Motion, seed: u64) -> Vec<Timed> {
     timed_readings(rig, motion, 3.0, seed)
 }
 
-/// Asserts that the mean error of single readings is at least `filter` times that of the filter and `smoother` times that of the smoother, and that
-/// the filter's 95 % regions contain the contact about that often.
+/// Asserts the ratio of mean errors of single readings to those of the filter and smoother, and the coverage
+/// of the filter's 95 % regions.
 pub(super) fn assert_closer_than_readings(
     likelihood: impl Likelihood + 'static,
     readings: &[Timed],
@@ -130,7 +130,7 @@ fn a_contact_that_lets_go_is_lost_and_found_again() {
     let motion = along_the_beam().with_speed(1.0).unwrap().with_passes(2).unwrap();
     let motion = motion.with_lifts(0.2, 0.02).unwrap();
     let wrong = wrongly_touching(likelihood(&rig, None), &readings(&rig, motion, 3));
-    // Only while the force is too small to be distinguished from noise.
+    // Only while the force is too small to be detected.
     assert!(wrong <= 15, "{wrong}");
 }
 
@@ -139,7 +139,7 @@ fn a_beam_that_swings_is_explained_by_its_first_mode() {
     let rig = rig();
     let likelihood = likelihood(&rig, Some(3.0));
     let load = |x_m: f64| Contact { position: Position::along(x_m), force_n: 3.0 };
-    // Bent as by a load in the middle, which has just jumped elsewhere.
+    // Bent as by a load in the middle that has just jumped.
     let mut response = swinging_beam().at_rest(1, &[load(0.2)]);
     response.change_loads(&[load(0.1)]);
     let sensors = &rig.setup.layout().sensors();
@@ -227,7 +227,7 @@ fn two_contacts_are_followed_while_one_lets_go_and_comes_down_again() {
     assert!(2.0 * tracked_m < alone_m, "{tracked_m} {alone_m}");
 }
 
-/// Distance of each of `touching` from its place among as many `found`; empty where they are not as many.
+/// Errors of the positions `found`; empty for another number.
 fn off_m(touching: &[f64], mut found: Vec<f64>) -> Vec<f64> {
     found.sort_by(f64::total_cmp);
     let pairs = touching.iter().zip(&found);
@@ -266,7 +266,7 @@ fn absurd_readings_and_gaps_leave_numbers_behind() {
     );
 }
 
-/// Asserts that readings far beyond any contact, ever longer apart, leave finite contacts on the surface.
+/// Asserts finite contacts on the surface after readings beyond any contact, at increasing intervals.
 pub(super) fn assert_numbers_after_absurd_readings<const C: usize>(
     likelihood: impl Likelihood + 'static,
     absurd: [[f64; C]; 5],
@@ -282,7 +282,7 @@ pub(super) fn assert_numbers_after_absurd_readings<const C: usize>(
     }
 }
 
-/// The derivatives of a linearisation against differences, and its reading against the noise-free one of the fits: the misfit is 0.
+/// Compares the derivatives of a linearisation with differences, and its reading with the noise-free one.
 pub(super) fn assert_linearised(likelihood: &dyn Likelihood, contact: Contact) {
     let at = likelihood.linearised(&[contact]);
     let forces = if likelihood.known_force_n().is_some() { 0.0 } else { 1.0 };
@@ -314,7 +314,7 @@ fn linearisations_are_those_of_differences() {
     }
 }
 
-/// A move of the baseline is subtracted from the drift, and the tracked contacts stay.
+/// A shift of the baseline moves the drift, and no contact.
 #[test]
 fn a_baseline_that_moves_moves_no_contact() {
     let rig = rig();
@@ -339,7 +339,8 @@ fn a_baseline_that_moves_moves_no_contact() {
     }
 }
 
-/// Beside an end, force and place of a constant contact trade off. They stay within the uncertainty of calibration, for any number of readings.
+/// Beside an end, force and position of a constant contact trade off; they stay within the calibration's
+/// uncertainty.
 #[test]
 fn the_force_of_a_held_contact_is_within_what_calibration_leaves() {
     let mut rig = crate::fixtures::paper(5e-6, 10);
@@ -385,7 +386,7 @@ fn contacts_end_within_the_residue_of_untouched_rows() {
     const EACH: usize = 30;
     let rig = rig();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
-    // An untouched row after each press, with a residue that is many times the noise.
+    // An untouched row after each press, with a residue of many times the noise.
     let mut recording = rig.simulate(1);
     let presses = std::mem::take(&mut recording.rows);
     for (i, press) in presses.into_iter().enumerate() {
@@ -429,7 +430,7 @@ fn contacts_end_within_the_residue_of_untouched_rows() {
     assert!(by_noise > all / 4, "{by_noise} of {all}");
 }
 
-/// The check of the held-out presses widens the intervals of the filter and the smoother as it widens those of the locator.
+/// The interval check widens the intervals of filter and smoother as it widens those of the locator.
 #[test]
 fn the_check_of_the_locators_intervals_widens_tracks() {
     let rig = rig();

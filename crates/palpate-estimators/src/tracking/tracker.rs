@@ -1,4 +1,4 @@
-//! The filter: it updates the hypotheses reading by reading.
+//! Filter and smoother of hypotheses.
 
 use super::bank::Step;
 use super::belief::{Belief, Moments, Observation};
@@ -12,18 +12,18 @@ use palpate_core::{Estimate, Status};
 use palpate_numerics::watch::{Cancelled, Watch};
 use std::sync::Arc;
 
-/// The most hypotheses at once.
+/// Greatest number of hypotheses.
 const MOST_HYPOTHESES: usize = 12;
-/// Hypotheses that are less probable than the best by more than this, in logarithms, are dropped.
+/// Greatest log ratio of the best hypothesis to a retained one.
 const MOST_LOG_RATIO: f64 = 16.0;
-/// The most contacts that are tracked at once.
+/// Greatest number of contacts.
 const MOST_CONTACTS: usize = 2;
 
-/// A contact that moves a reading by less than this is as likely as not to be gone with the next one: any light contact anywhere would explain the
-/// readings as well. In squares of the noise's standard deviation, over all channels.
+/// Fainter contacts end with probability ½ at the next reading, because they could be anywhere. Squared
+/// change over noise variance, summed over channels.
 const UNSEEN: f64 = 9.0;
 
-/// Tracks contacts through readings in time: up to two on a line, one on a plane.
+/// Filter of up to two contacts on a line, or one on a plane.
 ///
 /// ```
 /// use palpate_estimators::estimator::{Tracker, TrackerConfig};
@@ -45,41 +45,40 @@ const UNSEEN: f64 = 9.0;
 pub struct Tracker {
     likelihood: Arc<dyn Likelihood>,
     config: TrackerConfig,
-    /// Prior of the force of contacts; `None` where it is known.
+    /// `None` for a known force.
     force_prior: Option<ForcePrior>,
     hypotheses: Vec<Hypothesis>,
     time_s: Option<f64>,
     next_id: u64,
     whitened: Vec<f64>,
-    /// Drift and creep, where they are tracked; made with the first reading.
+    /// Drift and creep, created at the first reading.
     slow: Option<SlowState>,
 }
 
-/// Hypothesis: a surface with some contacts that came at some time and have moved since.
+/// Contacts that came at some time.
 #[derive(Clone, Debug, PartialEq)]
 struct Hypothesis {
-    /// Unique number of the hypothesis.
     id: u64,
-    /// ln of its probability.
+    /// ln of the probability.
     weight: f64,
     belief: Belief,
-    /// Whether the readings hardly determine the first contact, or the second.
+    /// Contacts that readings barely determine.
     unseen: [bool; MOST_CONTACTS],
 }
 
-/// Logarithms of the probabilities with which contacts have just come.
+/// Log birth probabilities.
 #[derive(Clone, Copy, Debug)]
 struct LogBirthProbabilities {
-    /// One contact, on an untouched surface or after another one let go.
+    /// Untouched, or after an end.
     one: f64,
-    /// Two, likewise.
+    /// Simultaneous.
     two: f64,
-    /// A second one, beside each hypothesis with one.
+    /// Beside one contact.
     beside: f64,
 }
 
 impl Tracker {
-    /// A tracker before its first reading.
+    /// Creates a tracker.
     pub fn new(likelihood: Arc<dyn Likelihood>, config: TrackerConfig) -> Self {
         Self {
             force_prior: likelihood.force_range().map(ForcePrior::from),
@@ -93,10 +92,10 @@ impl Tracker {
         }
     }
 
-    /// Takes the next reading: one finite value a channel, at `time_s` seconds.
+    /// Updates by a reading at `time_s` seconds.
     ///
     /// # Errors
-    /// [`TrackError`] when the time is not later than before; such a reading has no effect.
+    /// [`TrackError`] unless time increases, without effect.
     pub fn follow(&mut self, time_s: f64, reading: &[f64]) -> Result<Track, TrackError> {
         let duration_s = match self.time_s {
             Some(before_s) if time_s > before_s => Some(time_s - before_s),
@@ -114,7 +113,7 @@ impl Tracker {
         let mut single = likelihood.single_estimate(&reading);
         let log_births = self.predict(duration_s);
         if is_residue {
-            // The likelihood models noise alone: it would explain the residue by a light contact, which never ends.
+            // The likelihood models only noise: it would explain the residue by a persistent light contact.
             single = Estimate::of_contact(single.contact, Status::NoContact);
             self.end_contacts();
         }
@@ -130,7 +129,7 @@ impl Tracker {
         let mut track = self.track(time_s, single, moments);
         if let Some(slow) = &mut self.slow {
             let probability = track.numbers[track.contacts.len()];
-            // A surface that swings does not drift.
+            // A vibrating surface does not drift.
             if self.config.swing.is_none() || track.contacts.is_empty() {
                 slow.learn(&*likelihood, &whitened, &track.contacts, probability);
             }
@@ -144,15 +143,13 @@ impl Tracker {
         Ok(track)
     }
 
-    /// Adapts to a baseline of the readings that has moved by `by` in each channel, as by a tare; drift is counted from the new baseline. After a move
-    /// by more than the noise, drift and creep are estimated anew.
+    /// Subtracts a baseline shift per channel. After a shift above the noise, drift and creep restart.
     pub fn move_baseline(&mut self, by: &[f64]) {
         if let Some(slow) = self.slow(by.len()) {
             slow.move_baseline(by);
         }
     }
 
-    /// Drift and creep, where they are tracked.
     fn slow(&mut self, channels: usize) -> Option<&mut SlowState> {
         let TrackerConfig { drift, creep, .. } = self.config;
         let drifts = drift.is_some() || self.likelihood.untouched_drift().is_some();
@@ -170,9 +167,9 @@ impl Tracker {
         self.likelihood.most_contacts().min(MOST_CONTACTS)
     }
 
-    /// Predicts every hypothesis; contacts may come and go.
+    /// With births and ends.
     fn predict(&mut self, duration_s: Option<f64>) -> LogBirthProbabilities {
-        // Before the first reading, all numbers of contacts are equally probable.
+        // At the first reading, all numbers of contacts are equally probable.
         let Some(duration_s) = duration_s else {
             let each = -((1 + self.most_contacts()) as f64).ln();
             let belief = Belief::nothing();
@@ -206,7 +203,6 @@ impl Tracker {
         }
     }
 
-    /// Keeps only the hypothesis without contact.
     fn end_contacts(&mut self) {
         self.hypotheses.retain(|hypothesis| hypothesis.belief.contacts() == 0);
         if self.hypotheses.is_empty() {
@@ -214,7 +210,7 @@ impl Tracker {
         }
     }
 
-    /// Adds the beliefs that remain when contacts let go. All beliefs without contact are merged into one hypothesis.
+    /// Merges all without contact.
     fn add_remaining(&mut self, left: Vec<(f64, Belief)>) {
         for (weight, belief) in left {
             let same = self.hypotheses.iter_mut().find(|hypothesis| hypothesis.belief.contacts() == 0);
@@ -234,7 +230,6 @@ impl Tracker {
         self.next_id += 1;
     }
 
-    /// Updates every hypothesis and its weight by the reading.
     fn update(&mut self, observation: Observation) {
         for hypothesis in &mut self.hypotheses {
             match hypothesis.belief.updated(observation) {
@@ -247,7 +242,6 @@ impl Tracker {
         }
     }
 
-    /// Hypotheses of contacts that have come with this reading, with their weights.
     fn births(
         &self,
         log_births: LogBirthProbabilities,
@@ -279,8 +273,7 @@ impl Tracker {
         }
     }
 
-    /// Normalises the weights to probabilities, drops improbable hypotheses, and merges two that are the same into the more probable one. Returns the
-    /// moments of the remaining ones.
+    /// Normalises, drops, merges; returns the other moments.
     fn prune(&mut self) -> Vec<Vec<Moments>> {
         self.hypotheses.sort_by(|a, b| b.weight.total_cmp(&a.weight));
         let best = self.hypotheses.first().map_or(f64::NEG_INFINITY, |first| first.weight);
@@ -338,24 +331,24 @@ impl Tracker {
     }
 }
 
-/// Whether two sets of contacts are the same, in either order; two empty sets are the same.
+/// In either order.
 fn are_same_contacts(a: &[Moments], b: &[Moments]) -> bool {
     let same = |b: &mut dyn Iterator<Item = &Moments>| a.iter().zip(b).all(|(a, b)| a.is_same_contact(b));
     a.len() == b.len() && (same(&mut b.iter()) || same(&mut b.iter().rev()))
 }
 
-/// A [`Tracker`] with the history that smoothing needs.
+/// Smoother with a [`Tracker`].
 pub struct SmoothTracker {
     tracker: Tracker,
     tracks: Vec<Track>,
-    /// The hypotheses with contacts at each reading, by their ids.
+    /// Hypotheses at each reading, by id.
     past: Vec<Vec<(u64, Belief)>>,
-    /// Covariance of the drift after each reading; empty where no drift is tracked.
+    /// After each reading; empty without drift.
     drift_covariances: Vec<Array2<f64>>,
 }
 
 impl SmoothTracker {
-    /// A smoother before its first reading.
+    /// Creates a smoother.
     pub fn new(likelihood: Arc<dyn Likelihood>, config: TrackerConfig) -> Self {
         Self {
             tracker: Tracker::new(likelihood, config),
@@ -365,10 +358,10 @@ impl SmoothTracker {
         }
     }
 
-    /// Takes the next reading; see [`Tracker::follow`].
+    /// Updates as [`Tracker::follow`].
     ///
     /// # Errors
-    /// [`TrackError`] when the time is not later than before.
+    /// [`TrackError`].
     pub fn follow(&mut self, time_s: f64, reading: &[f64]) -> Result<(), TrackError> {
         let track = self.tracker.follow(time_s, reading)?;
         let lasts = |id: u64| self.tracker.hypotheses.iter().any(|hypothesis| hypothesis.id == id);
@@ -381,7 +374,7 @@ impl SmoothTracker {
             self.tracker.hypotheses.iter().filter(|hypothesis| hypothesis.belief.contacts() > 0);
         let mut remembered: Vec<_> =
             with_contacts.map(|hypothesis| (hypothesis.id, hypothesis.belief.clone())).collect();
-        // The reported one comes first.
+        // The reported hypothesis comes first.
         remembered.sort_by_key(|(_, belief)| belief.contacts() != track.contacts.len());
         self.past.push(remembered);
         self.drift_covariances
@@ -390,17 +383,17 @@ impl SmoothTracker {
         Ok(())
     }
 
-    /// Filtered tracks, one a reading.
+    /// Filtered tracks.
     pub fn filtered(&self) -> &[Track] {
         &self.tracks
     }
 
-    /// Smoothed tracks, one a reading. The number of contacts stays that of the filter; among its hypotheses, the one that lasted is smoothed.
+    /// Smoothed tracks, with the filter's numbers of contacts.
     ///
     /// # Errors
-    /// [`Cancelled`] when the watch stopped it.
+    /// [`Cancelled`].
     pub fn smoothed(&self, watch: Watch) -> Result<Vec<Track>, Cancelled> {
-        /// Readings between two checks of the watch.
+        /// Readings per check of the watch.
         const EACH: usize = 16;
         let mut smoothed = self.tracks.clone();
         // The contacts at the next reading, given all readings.
@@ -426,7 +419,6 @@ impl SmoothTracker {
         Ok(smoothed)
     }
 
-    /// Belief of hypothesis `id` at reading `k`, given its belief at the next.
     fn smoothed_belief(&self, k: usize, id: u64, later: &Belief) -> Option<(u64, Belief)> {
         let (_, belief) = self.past[k].iter().find(|(remembered, _)| *remembered == id)?;
         let step = self.tracker.step(self.tracks[k + 1].time_s - self.tracks[k].time_s);

@@ -1,22 +1,20 @@
-//! Tails of untouched readings that are heavier than those of a normal distribution.
+//! Heavy tails of untouched readings.
 
 use crate::status::SIGNIFICANCE;
 use palpate_numerics::{normal_quantile, student_critical_value, student_ln_density};
 
-/// Student's t distribution of deviations in units of their standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct HeavyTails {
     /// ν.
     freedom: f64,
-    /// Scale of the t variable; its standard deviation is √(ν/(ν − 2)) times this.
+    /// The standard deviation is √(ν/(ν − 2)) times this.
     scale: f64,
 }
 
 impl HeavyTails {
-    /// The most likely distribution of deviations with weights; `None` where a normal distribution explains them at the 5 % level, by the likelihood ratio.
+    /// `None` for normality at the 5 % level, by likelihood ratio.
     pub fn of_deviations(deviations: &[(f64, f64)]) -> Option<Self> {
-        /// Degrees of freedom of the search, in powers of √2 of the least. With 2 or fewer the variance is not finite, and beyond 40 the
-        /// distribution hardly differs from a normal one.
+        /// At 2 the variance is infinite; beyond 40 tails are almost normal.
         const LEAST: f64 = 2.5;
         const POWERS: i32 = 8;
         let total: f64 = deviations.iter().map(|(_, weight)| weight).sum();
@@ -43,11 +41,9 @@ impl HeavyTails {
         deviations.iter().map(of_one).sum()
     }
 
-    /// Bound of Σ d²/2 over some channels, at a rate of false alarms. d is the difference of two deviations of variance 1, and such noise
-    /// makes up at most the given share of this variance.
-    ///
-    /// The sum of heavy-tailed variables is large where one of them is (Foss, Korshunov and Zachary, *An Introduction to Heavy-Tailed and Subexponential Distributions*,
-    /// 2013): one of the two deviations of one channel exceeds x, and the other channels have their mean.
+    /// Critical value of Σ d²/2, d the difference of two deviations of variance 1 with this share of noise:
+    /// one deviation exceeds x, the other channels have their mean (Foss, Korshunov and Zachary, *An
+    /// Introduction to Heavy-Tailed and Subexponential Distributions*, 2013).
     pub fn bound(&self, channels: usize, share: f64, rate: f64) -> f64 {
         let n = channels as f64;
         let x = self.scale * student_critical_value(rate / (2.0 * n), self.freedom);
@@ -55,8 +51,8 @@ impl HeavyTails {
     }
 }
 
-/// Scale of the most likely t distribution of given degrees of freedom, by the expectation-maximization algorithm (Lange, Little and Taylor, *Journal of the
-/// American Statistical Association* 84, 1989).
+/// Expectation–maximization (Lange, Little and Taylor, *Journal of the American Statistical Association* 84,
+/// 1989).
 fn most_likely_scale(deviations: &[(f64, f64)], variance: f64, freedom: f64) -> f64 {
     const ROUNDS: usize = 30;
     let total: f64 = deviations.iter().map(|(_, weight)| weight).sum();

@@ -8,7 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 const CHANNELS: usize = 6;
 
-/// Presses with an untouched row after each. The residue has a part for each channel, and a part that all channels share.
+/// Presses with an untouched row after each, with independent and common residue.
 fn recording(rng: &mut Xoshiro256PlusPlus, rests: usize, [own, shared]: [f64; 2], drift: f64) -> Recording {
     let mut rows = Vec::new();
     for i in 0..rests {
@@ -34,7 +34,7 @@ fn setup() -> Setup {
     Setup::measured(0.3, &["a", "b", "c", "d", "e", "f"]).unwrap()
 }
 
-/// Share of changes from one rest to the next that are beyond the scatter, over many recordings.
+/// Share of changes between rests beyond the scatter, over many recordings.
 fn false_alarms(rests: usize, parts: [f64; 2], drift: f64, rate: f64) -> f64 {
     const RECORDINGS: usize = 400;
     const ASKED: usize = 100;
@@ -93,7 +93,7 @@ fn noise_explains_the_rests_of_19_recordings_in_20_and_no_residue() {
         };
         (0..400).filter(is_noise).count()
     };
-    // 380 are expected for noise, and a little fewer as its square is not quite normal.
+    // 380 are expected for noise, and a little fewer as squares are not quite normal.
     let (noise, residue) = (explained(0.0), explained(1.0));
     assert!((362..=395).contains(&noise) && residue < 20, "{noise} {residue}");
 }
@@ -172,7 +172,7 @@ fn methods_without_a_rule_of_no_contact_have_one_by_untouched_rows() {
     }
 }
 
-/// Noise of four degrees of freedom: a few untouched rows hardly show its tails, and repeated presses do.
+/// Noise of four degrees of freedom: repeats show the tails, few untouched rows hardly do.
 #[test]
 fn heavy_tails_of_repeated_presses_bound_the_rests() {
     const RECORDINGS: usize = 40;
@@ -206,6 +206,6 @@ fn heavy_tails_of_repeated_presses_bound_the_rests() {
         beyond += (0..ASKED).filter(|_| !scatter.contains(&asked())).count();
     }
     let found = beyond as f64 / (RECORDINGS * ASKED) as f64;
-    // The far tail is estimated from 720 values: its rate is right within a factor of five. By the variance alone it is 1.7 %.
+    // The far tail is estimated from 720 values: within a factor of five. By the variance alone it is 1.7 %.
     assert!((0.2 * RATE..5.0 * RATE).contains(&found) && are_noise <= 4, "{found}, {are_noise}");
 }

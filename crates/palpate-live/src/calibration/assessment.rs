@@ -1,4 +1,4 @@
-//! Assessment of a calibration: its error at held-out positions, and the gain of more presses.
+//! Assessment of a calibration.
 
 use palpate_design::positions::{PositionDesign, next_press};
 use palpate_estimators::evaluation::{Evaluation, cross_validate};
@@ -7,13 +7,12 @@ use palpate_estimators::recording::Recording;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_rig::Rig;
 
-/// Folds of the cross-validation.
 const FOLDS: usize = 5;
 
-/// Errors at held-out positions of the fit, in metres.
+/// Errors of cross-validation, in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeldOut {
-    /// Folds of the cross-validation.
+    /// Number of folds.
     pub folds: usize,
     /// Median error.
     pub median_m: f64,
@@ -24,14 +23,14 @@ pub struct HeldOut {
 /// Expected gain of more presses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gain {
-    /// Reduction of the expected error by an unlimited number of presses, in %.
+    /// Reduction of the expected error by unlimited presses, in %.
     pub percent: f64,
-    /// Gain in % below which more presses are not worthwhile.
+    /// Threshold of a worthwhile gain, in %.
     pub stop_percent: f64,
 }
 
 impl Gain {
-    /// True if more presses are not worthwhile.
+    /// True if the gain is below the threshold.
     pub fn is_enough(&self) -> bool {
         self.percent < self.stop_percent
     }
@@ -40,21 +39,21 @@ impl Gain {
 /// Assessment of a calibration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Assessment {
-    /// Errors at held-out positions; `None` if there are too few positions, or a fold cannot be fitted.
+    /// Held-out errors; `None` with too few positions, or after a failed fit.
     pub held_out: Option<HeldOut>,
-    /// Error of each press at its held-out position, in metres, in the order of the recording; empty if the errors are unknown.
+    /// Held-out error of each press in metres; empty if unknown.
     pub errors_m: Vec<Option<f64>>,
-    /// Gain of more presses; `None` if it is unknown.
+    /// Gain of more presses; `None` if unknown.
     pub gain: Option<Gain>,
-    /// Reasons why a result is missing.
+    /// Reasons for missing results.
     pub remarks: Vec<String>,
 }
 
 impl Assessment {
-    /// The assessment of a recording of a rig, with a new fit of the estimator for every fold.
+    /// Assesses a recording of a rig, with a new fit for every fold.
     ///
     /// # Errors
-    /// [`Cancelled`] if the watch stopped it.
+    /// [`Cancelled`] by the watch.
     pub fn new(rig: &Rig, recording: &Recording, seed: u64, watch: Watch) -> Result<Self, Cancelled> {
         let mut own = Self::default();
         if recording.distinct_positions().len() >= FOLDS {
@@ -85,7 +84,6 @@ impl Assessment {
     }
 }
 
-/// Errors of a cross-validation in the order of the presses. The results of the evaluation are in the order of its folds.
 fn errors_by_press(recording: &Recording, evaluation: &Evaluation) -> Vec<Option<f64>> {
     let presses = recording.rows.iter().scan(0, |presses, row| {
         let press = row.touches().then_some(*presses);

@@ -1,39 +1,34 @@
-//! The untouched reading of each channel with its noise, and readings compared with it.
+//! Baseline: untouched reading and noise of each channel.
 
 use super::stretch::{LONGEST_SPAN, REST_SPAN, Stretch, mean};
 
-/// Deviation of one reading above which it does not count as noise, in standard deviations: Gaussian noise reaches it once in 10¹⁴ values.
+/// Limit of noise, in standard deviations; Gaussian noise exceeds it once in 10¹⁴ values.
 pub const NOISE_LIMIT_SD: f64 = 8.0;
-/// Largest difference between the means of two halves of a stretch at rest, in standard deviations of that difference.
+/// Limit on the difference between half means at rest, in its standard deviations.
 const REST_SD: f64 = 3.5;
-/// Largest ratio of the variance about a line to the variance of successive differences. A logger that repeats every value 25 times reaches it;
-/// above it, the surface moves.
+/// Limit on the ratio of the variance about a line to that of successive differences; 25-fold repeated values
+/// reach it.
 const LARGEST_CORRELATION: f64 = 25.0;
-/// Largest number of decimals that is tried for the resolution of a channel.
 const MOST_DECIMALS: i32 = 9;
 
-/// Noise and drift of a channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Noise {
-    /// Standard deviation of one reading.
     sd: f64,
-    /// Factor by which the variance of a mean exceeds that of independent readings.
+    /// Ratio of the variance of a mean to that of independent readings.
     correlation: f64,
-    /// Drift while the noise was learnt, per second.
     drift_per_s: f64,
 }
 
 /// Untouched reading and noise of each channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Baseline {
-    /// Mean untouched reading of each channel.
     pub mean: Vec<f64>,
     noise: Vec<Noise>,
 }
 
 impl Baseline {
-    /// The baseline of a stretch at rest, or of one with a steady drift over [`LONGEST_SPAN`]; `None` while the stretch is too short or the surface
-    /// moves.
+    /// Learns the baseline of a stretch at rest, or with a steady drift over [`LONGEST_SPAN`]; `None`
+    /// otherwise.
     pub fn learn(stretch: &Stretch) -> Option<Self> {
         let readings = stretch.for_noise()?;
         let span_s = -readings.first()?.0;
@@ -50,17 +45,16 @@ impl Baseline {
         (is_steady || still.is_at_rest(&all, 0.0)).then_some(baseline)
     }
 
-    /// Standard deviation of the noise of each channel.
     pub fn noise_sd(&self) -> Vec<f64> {
         self.noise.iter().map(|noise| noise.sd).collect()
     }
 
-    /// Largest deviation of a reading from the baseline, in standard deviations of the noise.
+    /// Largest deviation, in standard deviations.
     pub fn size(&self, reading: &[f64]) -> f64 {
         self.size_of(&self.deviation(reading))
     }
 
-    /// Largest component of a deviation, in standard deviations of the noise.
+    /// Largest component, in standard deviations.
     pub fn size_of(&self, deviation: &[f64]) -> f64 {
         deviation
             .iter()
@@ -69,12 +63,11 @@ impl Baseline {
             .fold(0.0, f64::max)
     }
 
-    /// Deviation of a reading from the baseline, channel by channel.
     pub fn deviation(&self, reading: &[f64]) -> Vec<f64> {
         reading.iter().zip(&self.mean).map(|(value, mean)| value - mean).collect()
     }
 
-    /// Euclidean length of a deviation, each channel in standard deviations of its noise.
+    /// Euclidean norm in standard deviations.
     pub fn length_of(&self, deviation: &[f64]) -> f64 {
         deviation
             .iter()
@@ -84,14 +77,14 @@ impl Baseline {
             .sqrt()
     }
 
-    /// Inner product of two deviations, each channel in standard deviations of its noise.
+    /// Inner product in standard deviations.
     pub fn product_of(&self, a: &[f64], b: &[f64]) -> f64 {
         a.iter().zip(b).zip(&self.noise).map(|((a, b), noise)| a * b / noise.sd.powi(2)).sum()
     }
 
-    /// True if the means of both halves of the readings agree within the noise, the drift and `allowed` standard deviations of the noise.
+    /// True if the means of both halves agree within noise, drift and `allowed` standard deviations.
     ///
-    /// A change below the noise of one reading is always allowed, because single readings are recorded.
+    /// One standard deviation is always allowed, because single readings are recorded.
     pub fn is_at_rest(&self, readings: &[&[f64]], allowed: f64) -> bool {
         let (first, second) = readings.split_at(readings.len() / 2);
         let sd_of_difference = (1.0 / first.len() as f64 + 1.0 / second.len() as f64).sqrt();
@@ -99,13 +92,12 @@ impl Baseline {
         let (first, second) = (mean(first), mean(second));
         first.iter().zip(&second).zip(&self.noise).all(|((first, second), noise)| {
             let by_noise = REST_SD * sd_of_difference * noise.correlation.sqrt();
-            // Twice the learnt drift, because a drift changes slowly.
+            // Factor 2, because the drift changes slowly.
             let by_drift = 2.0 * noise.drift_per_s.abs() * half_s;
             (first - second).abs() <= (by_noise.max(1.0) + allowed) * noise.sd + by_drift
         })
     }
 
-    /// Largest change between both halves of readings, in standard deviations of the noise.
     pub fn change(&self, readings: &[&[f64]]) -> f64 {
         let (first, second) = readings.split_at(readings.len() / 2);
         let (first, second) = (mean(first), mean(second));
@@ -115,10 +107,11 @@ impl Baseline {
 }
 
 impl Noise {
-    /// Noise of a channel from readings with their seconds; `None` if the channel moves.
+    /// Returns the noise of a channel; `None` if the channel moves.
     ///
-    /// The variance of independent readings is half the mean square of successive differences, which a slow drift leaves unchanged (von Neumann 1941).
-    /// Filtered or repeated values have smaller differences than their scatter about a line: the ratio of both is the correlation.
+    /// The variance of independent readings is half the mean square of successive differences (von Neumann
+    /// 1941), unaffected by slow drift. Filtered or repeated values have smaller differences: the ratio to
+    /// the variance about a line is the correlation.
     fn learn(readings: &[(f64, &[f64])], channel: usize) -> Option<Self> {
         let values: Vec<(f64, f64)> =
             readings.iter().map(|(at_s, reading)| (*at_s, reading[channel])).collect();
@@ -135,7 +128,7 @@ impl Noise {
         let drift_per_s = if along > 0.0 { across / along } else { 0.0 };
         let residuals = values.iter().map(|(at_s, value)| value - mean - drift_per_s * (at_s - mean_s));
         let about_line = residuals.map(|residual| residual * residual).sum::<f64>() / (n - 2.0).max(1.0);
-        // A channel that has been constant may still change by a step of its converter.
+        // A constant channel may still change by one step.
         let least_sd = (0.5 * resolution(&values)).max(1e-9 * mean.abs()).max(f64::MIN_POSITIVE.sqrt());
         let least = least_sd * least_sd;
         let correlation = about_line.max(least) / of_differences.max(least);
@@ -147,7 +140,7 @@ impl Noise {
     }
 }
 
-/// Decimal step that divides all values, such as 1 for raw counts; 0 without such a step.
+/// Largest decimal step that divides all values; 0 without one.
 fn resolution(values: &[(f64, f64)]) -> f64 {
     let is_multiple = |value: f64, scale: f64| {
         let scaled = value * scale;

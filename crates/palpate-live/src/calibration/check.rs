@@ -1,4 +1,4 @@
-//! Check of a locator at fresh places, which were not pressed in the calibration.
+//! Check of a locator at fresh places.
 
 use super::plan::{Ruler, Weights};
 use super::press::Press;
@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 /// Number of fresh places of a check.
 pub const CHECK_PLACES: usize = 5;
 
-/// Presses of a check, at places between those of the calibration. They use the weights of the calibration in turn, or `depths_m` in turn if a
-/// machine presses. Empty if the calibration has only one place.
+/// Returns presses between the calibrated places, with the weights or `depths_m` in turn; empty for one
+/// place.
 pub fn check_presses(rig: &Rig, rows: &[Row], weights: Weights, depths_m: &[f64]) -> Vec<Press> {
     let extent = rig.setup.surface().extent();
     let calibrated: Vec<Position> = rows.iter().filter(|row| row.touches()).map(|row| row.position).collect();
@@ -28,12 +28,10 @@ pub fn check_presses(rig: &Rig, rows: &[Row], weights: Weights, depths_m: &[f64]
     places.map(|(position, (force_n, depth_m))| Press { position, force_n, depth_m }).collect()
 }
 
-/// Places far from those of a calibration: one in each of [`CHECK_PLACES`] equal segments of its longer side.
+/// Returns a place far from calibrated ones in each of [`CHECK_PLACES`] segments of the longer side.
 fn fresh_places(calibrated: &[Position], extent: Extent) -> Vec<Position> {
-    /// Number of candidates along a segment, and across it.
     const CANDIDATES: usize = 40;
-    /// Share of the largest distance to a calibrated place that counts as far. Among the far candidates, the places of the check are chosen far
-    /// apart.
+    /// Share of the largest distance that counts as far.
     const FAR: f64 = 0.9;
     let Some((low, high)) = bounds(calibrated) else { return Vec::new() };
     let ruler = Ruler::among(calibrated, extent);
@@ -65,7 +63,6 @@ fn fresh_places(calibrated: &[Position], extent: Extent) -> Vec<Position> {
     chosen
 }
 
-/// Opposite corners of the bounding rectangle of some places; `None` for a point.
 fn bounds(places: &[Position]) -> Option<(Position, Position)> {
     let extreme = |pick: fn(f64, f64) -> f64, start: f64| Position {
         x_m: places.iter().map(|at| at.x_m).fold(start, pick),
@@ -79,7 +76,7 @@ fn nearest_m(at: Position, places: &[Position]) -> f64 {
     places.iter().map(|place| at.distance_m(*place)).fold(f64::INFINITY, f64::min)
 }
 
-/// File of the presses of a check, beside the file of presses: `presses-check.csv`, or with the first free number.
+/// Returns `presses-check.csv` beside the file of presses, or the first free number.
 pub fn check_path(presses: &Path) -> PathBuf {
     let stem = presses.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let suffix =
@@ -100,32 +97,32 @@ pub fn check_path(presses: &Path) -> PathBuf {
 pub struct CheckedPlace {
     /// Requested place.
     pub position: Position,
-    /// Estimate of the locator.
+    /// Estimate.
     pub estimate: Position,
     /// Distance between both, in metres.
     pub error_m: f64,
-    /// True if the 95 % region covers the place; `None` for a locator without regions.
+    /// True for a place in the 95 % region; `None` without regions.
     pub covered: Option<bool>,
 }
 
 /// Outcome of a check.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Check {
-    /// The places, in the order in which they were pressed.
+    /// Places in the order of the presses.
     pub places: Vec<CheckedPlace>,
-    /// Median and mean error, in metres.
+    /// Median error, in metres.
     pub median_m: f64,
     /// Mean error, in metres.
     pub mean_m: f64,
-    /// Number of places that the 95 % regions cover; `None` for a locator without regions.
+    /// Places in their 95 % regions; `None` without regions.
     pub covered: Option<usize>,
 }
 
 impl Check {
-    /// Locates the presses of a check, each tared with the untouched rows before and after it; `None` without a press.
+    /// Locates the presses, tared with the untouched rows; `None` without a press.
     ///
     /// # Errors
-    /// [`ReadingError`] if the channels differ from those of the locator.
+    /// [`ReadingError`] for other channels.
     pub fn new(locator: &Locator, recording: &Recording) -> Result<Option<Self>, ReadingError> {
         let evaluation = Evaluation::new(locator, &tared(locator, recording))?;
         let Some(summary) = evaluation.summary(None) else { return Ok(None) };
@@ -145,7 +142,6 @@ impl Check {
     }
 }
 
-/// The readings with the offsets of the locator's calibration, as the tare of a session provides them.
 fn tared(locator: &Locator, recording: &Recording) -> Recording {
     let mut tared = recording.clone();
     let Some(learnt) = &locator.untouched else { return tared };
@@ -226,7 +222,6 @@ mod tests {
         let check = Check::new(&locator, &recording).unwrap().unwrap();
         assert_eq!(check.places.len(), CHECK_PLACES);
         assert!(check.median_m < 1e-3 && check.covered >= Some(4), "{check:?}");
-        // A place that is pressed 20 mm away is an error that the interval does not cover.
         recording.rows[2].position.x_m += 0.02;
         let missed = Check::new(&locator, &recording).unwrap().unwrap();
         assert!(missed.places[2].error_m > 0.019 && missed.places[2].covered == Some(false), "{missed:?}");

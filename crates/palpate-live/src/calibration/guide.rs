@@ -1,10 +1,9 @@
-//! The guide of a calibration: the order of the presses, and the time at which the reading of each is recorded.
+//! Guide of a calibration: order of the presses, and detection of rest.
 //!
-//! Means over a stretch show whether a surface is at rest; the single reading in the middle of the stretch is recorded. A locator learns the noise
-//! of a reading from the rows, and readings in use are single ones. From means it would learn noise that is too small by the square root of their
-//! number. The last reading of a stretch may already be the first of a lift.
+//! Means over a stretch detect rest, but the row is its middle reading: the locator learns the noise of
+//! single readings. The last reading may belong to a lift.
 //!
-//! The untouched row of a press is recorded together with the press. It is thus the last reading before the touch, after any drift in between.
+//! The untouched row is recorded with its press, after any drift.
 
 use super::baseline::{Baseline, NOISE_LIMIT_SD};
 use super::press::Press;
@@ -15,61 +14,58 @@ use palpate_mechanics::contact::Position;
 use serde::Serialize;
 use std::time::Duration;
 
-/// Consecutive deviating readings that count as a touch: one or two may be glitches.
+/// Consecutive deviating readings of a touch; fewer may be glitches.
 pub(super) const ONSET_READINGS: u32 = 3;
-/// Step of the untouched reading that is accepted at once, in standard deviations of the noise. A larger one may be a light finger, and must last
-/// for [`PATIENCE`].
+/// Step of the baseline accepted at once, in standard deviations; larger steps may be light touches, and must
+/// last [`PATIENCE`].
 const FOLLOWED_STEP_SD: f64 = 2.0;
-/// Share of the largest press below which a deviation does not count as a touch, because creep and hysteresis leave as much.
+/// Share of the largest press attributed to creep or hysteresis.
 const RESIDUE_SHARE: f64 = 0.005;
-/// Largest change of the reading of a press between both halves of a stretch at rest, as a share of the press: soft surfaces creep, and hands
-/// tremble.
+/// Largest relative change of a press at rest: soft surfaces creep, and hands tremble.
 const REST_SHARE: f64 = 0.005;
-/// `REST_SHARE` after [`PATIENCE`], so that a hand that never rests is still accepted.
+/// `REST_SHARE` after [`PATIENCE`].
 const PATIENT_REST_SHARE: f64 = 0.02;
-/// Largest change of the untouched reading while the surface recovers from creep, as a share of the press.
+/// Largest relative change at rest during recovery from creep.
 const RECOVERY_SHARE: f64 = 0.001;
-/// Time after which the criterion of rest is less strict.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// Time after which a recovering surface counts as at rest.
 const RECOVERY: Duration = Duration::from_millis(1500);
-/// Share of a press that may remain after it was lifted, and share of the largest press that hysteresis may leave.
+/// Share of a press that may remain after a lift, and share of the largest press left by hysteresis.
 const LIFTED_SHARE: f64 = 0.1;
 const HYSTERESIS_SHARE: f64 = 0.03;
-/// Share of a press below which a reading at rest by noise alone for [`PARTLY_LIFTED`] counts as lifted.
+/// Share of a press below which rest for [`PARTLY_LIFTED`] is a lift.
 const PARTLY_LIFTED_SHARE: f64 = 0.5;
 const PARTLY_LIFTED: Duration = Duration::from_secs(2);
-/// Share of the largest deviation of a touch below which a reading at rest counts as the rest of a lift.
+/// Share of the peak below which a reading at rest is a lift.
 const LIFT_TAIL_SHARE: f64 = 1.0 / 3.0;
-/// Cosine of the angle to the last press below which a deviation counts as opposite to it.
+/// Cosine of opposite deviations.
 const AGAINST: f64 = -0.8;
-/// Smallest share of a press that develops within a second; a slower change counts as drift.
+/// Smallest growth of a press within a second, relative; slower changes are drift.
 const ONSET_SHARE: f64 = 0.2;
-/// Time for which a finger may rest lightly before it presses: a doubtful touch that rests for longer is requested again.
+/// Rest of a doubtful touch before a new request.
 const LINGER: Duration = Duration::from_millis(1200);
-/// Silence after which the untouched reading is learnt again, because the board may have restarted.
+/// Silence after which the board may have restarted.
 const SILENCE: Duration = Duration::from_secs(5);
 
-/// Next step that a guide waits for.
+/// Awaited step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Waiting {
-    /// The untouched reading is learnt; the surface must be left alone.
+    /// Learning of the baseline.
     Untouched,
     /// The next press.
     Press,
-    /// The reading must come to rest.
+    /// Rest of the reading.
     Rest,
-    /// The surface must be let go.
+    /// End of the calibration.
     Release,
-    /// All presses are done, or the calibration was ended.
+    /// End.
     Nothing,
 }
 
-/// A row of the recording with the mean reading of its stretch at rest.
+/// Row with the mean reading of its stretch at rest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RestingRow {
-    /// The row, with the reading in the middle of the stretch.
+    /// Row with the middle reading.
     pub row: Row,
     /// Mean reading of the stretch.
     pub mean: Vec<f64>,
@@ -80,86 +76,76 @@ pub struct RestingRow {
 pub enum Progress {
     /// No change.
     None,
-    /// The guide waits for another step.
+    /// Another step is awaited.
     Waits(Waiting),
     /// A press was recorded.
     Pressed {
-        /// The untouched surface before it; `None` if it was recorded already.
+        /// Untouched row before it; `None` if already recorded.
         untouched: Option<RestingRow>,
         /// The press.
         press: RestingRow,
     },
-    /// The last press grew without a lift, and this row replaces it.
+    /// The last press grew and is replaced.
     Replaced(RestingRow),
-    /// The untouched surface after the last press was recorded.
+    /// The last untouched row was recorded.
     Untouched(RestingRow),
     /// The press is requested again.
     AskedAgain(Doubt),
-    /// The recorded press is taken back, and requested again.
+    /// The recorded press is requested again.
     TakenBack(Doubt),
 }
 
-/// A touch since its onset.
 #[derive(Clone, Copy, Debug, Default)]
 struct Touch {
-    /// Number of consecutive deviating readings before the onset.
     onset: u32,
-    /// Largest deviation of [`ONSET_READINGS`] consecutive readings, in standard deviations of the noise.
+    /// Largest minimum of [`ONSET_READINGS`] consecutive deviations.
     peak: f64,
-    /// Deviations of the last two readings.
     recent: [f64; 2],
-    /// Largest growth within a second, in standard deviations of the noise.
+    /// Largest growth within a second.
     fastest: f64,
-    /// Instant since which the reading rests and is doubtful.
     doubtful_since: Option<Duration>,
 }
 
-/// Growth of a touch after its reading was recorded.
+/// Growth of a recorded touch.
 #[derive(Clone, Debug, Default)]
 struct Growth {
-    /// Instant since which the readings are larger, and their number.
     since: Duration,
     readings: u32,
-    /// True once the growth has lasted: a hand may jerk as it lifts.
+    /// A hand may jerk during a lift.
     has_lasted: bool,
-    /// Largest deviation.
     deviation: Vec<f64>,
 }
 
-/// The guide of a calibration.
+/// Guide of a calibration.
 #[derive(Clone, Debug)]
 pub struct Guide {
     plan: Vec<Press>,
-    /// Index of the next press.
     next: usize,
     waiting: Waiting,
-    /// Instant since which the guide waits, or of the last update of the untouched reading.
+    /// Start of the wait, or last update of the baseline.
     since: Duration,
-    /// Instant of the last reading, also of one that repeats the reading before it.
     last_at: Option<Duration>,
-    /// True if the source repeats readings because it is faster than its sensors: each counts once.
     is_sample_and_hold: bool,
     stretch: Stretch,
-    /// Untouched reading, updated with the drift while the surface is untouched.
     baseline: Option<Baseline>,
-    /// The last untouched reading at rest, which is recorded with the next press.
+    /// Last untouched row at rest.
     untouched: Option<RestingRow>,
-    /// Mean untouched reading that was learnt or recorded with a press last. A reading that returns to it does not count as a press.
+    /// Untouched mean learnt or recorded last.
     reference: Vec<f64>,
     touch: Touch,
-    /// Deviation of the press that must be released: recorded, or requested again.
+    /// Deviation before the release.
     pressed: Vec<f64>,
     is_recorded: bool,
     growth: Growth,
-    /// Largest effect of a finger that may remain after the last lift, in standard deviations of the noise; 0 once it is gone.
+    /// Largest remaining effect of a finger after a lift.
     lingering: f64,
-    /// True from a lift until the untouched reading is at rest by noise alone: soft surfaces creep back.
+    /// From a lift to rest within noise.
     is_recovering: bool,
     checks: RepeatCheck,
 }
 
 impl Guide {
-    /// A guide for a plan.
+    /// Creates the guide of a plan.
     pub fn new(plan: Vec<Press>) -> Self {
         let waiting = if plan.is_empty() { Waiting::Nothing } else { Waiting::Untouched };
         Self {
@@ -183,13 +169,13 @@ impl Guide {
         }
     }
 
-    /// Sets the rows of earlier presses, with which new presses are also compared.
+    /// Sets the rows of earlier presses for comparison.
     pub fn with_rows(mut self, rows: &[Row]) -> Self {
         self.checks = RepeatCheck::new(rows);
         self
     }
 
-    /// The next press, and its number in the plan from 0; `None` after the last.
+    /// Index and next press; `None` after the last.
     pub fn next_press(&self) -> Option<(usize, Press)> {
         self.plan.get(self.next).map(|press| (self.next, *press))
     }
@@ -204,27 +190,27 @@ impl Guide {
         &self.plan
     }
 
-    /// The step that the guide waits for.
+    /// Awaited step.
     pub fn waiting(&self) -> Waiting {
         self.waiting
     }
 
-    /// True if the source repeats readings because it is faster than its sensors: each counts once.
+    /// True if the source repeats readings, because its sensors are slower.
     pub fn is_sample_and_hold(&self) -> bool {
         self.is_sample_and_hold
     }
 
-    /// Present mean untouched reading; `None` before it is learnt.
+    /// Mean untouched reading, if learnt.
     pub fn untouched_reading(&self) -> Option<&[f64]> {
         self.baseline.as_ref().map(|baseline| baseline.mean.as_slice())
     }
 
-    /// Standard deviation of the noise of each channel; `None` before it is learnt.
+    /// Standard deviation of each channel, if learnt.
     pub fn noise_sd(&self) -> Option<Vec<f64>> {
         self.baseline.as_ref().map(Baseline::noise_sd)
     }
 
-    /// The awaited condition and the present reading, in a sentence; `None` if the step itself is explanation enough.
+    /// Explains the awaited condition, if necessary.
     pub fn explain(&self) -> Option<String> {
         let Some(baseline) = &self.baseline else {
             return (self.waiting == Waiting::Untouched)
@@ -255,7 +241,7 @@ impl Guide {
         }
     }
 
-    /// Processes a reading at an instant.
+    /// Processes a reading.
     pub fn add(&mut self, at: Duration, reading: &[f64]) -> Progress {
         if self.last_at.is_some_and(|last| at.saturating_sub(last) > SILENCE) {
             self.relearn();
@@ -287,7 +273,7 @@ impl Guide {
         }
     }
 
-    /// Takes back the last press, which is requested again; false if there is none.
+    /// Removes the last press and requests it again; false without one.
     pub fn redo(&mut self) -> bool {
         if self.next == 0 {
             return false;
@@ -299,7 +285,7 @@ impl Guide {
         true
     }
 
-    /// Leaves out the next press.
+    /// Skips the next press.
     pub fn skip(&mut self) {
         if self.next < self.plan.len() {
             self.plan.remove(self.next);
@@ -309,7 +295,7 @@ impl Guide {
         }
     }
 
-    /// Learns the untouched reading again, after the operator has stated that the surface is untouched, or after the source was lost.
+    /// Learns the baseline again.
     pub fn relearn(&mut self) {
         self.stretch.clear();
         self.touch = Touch::default();
@@ -335,17 +321,16 @@ impl Guide {
         }
     }
 
-    /// Discards the readings of the last seconds, for example those before a move of a machine; the baseline is kept.
+    /// Discards the recent readings, but not the baseline.
     pub fn forget_readings(&mut self) {
         self.stretch.clear();
     }
 
-    /// Returns to the first step that the next press needs.
     fn restart(&mut self) {
         self.waiting = match self.waiting {
             _ if self.next >= self.plan.len() => Waiting::Nothing,
             _ if self.baseline.is_none() => Waiting::Untouched,
-            // The present touch does not belong to a press of the plan.
+            // The present touch belongs to another press.
             Waiting::Rest => {
                 self.pressed = self.present_deviation();
                 Waiting::Release
@@ -355,7 +340,6 @@ impl Guide {
         };
     }
 
-    /// Deviation of the last reading from the untouched reading.
     fn present_deviation(&self) -> Vec<f64> {
         match (&self.baseline, self.stretch.last()) {
             (Some(baseline), Some(reading)) => baseline.deviation(reading),
@@ -380,8 +364,8 @@ impl Guide {
         self.begin_press(at)
     }
 
-    /// Removes repeated readings if the source is faster than its sensors. A touch changes all channels together in any source. The readings must
-    /// therefore be at rest.
+    /// Removes repeated readings of a source faster than its sensors. Only at rest, because a touch changes
+    /// all channels together.
     fn count_repeats_once(&mut self) {
         let Some(distinct) = self.stretch.without_repeats().filter(|_| !self.is_sample_and_hold) else {
             return;
@@ -393,7 +377,6 @@ impl Guide {
         }
     }
 
-    /// Waits for the next press, or ends with the untouched row after the last one.
     fn begin_press(&mut self, at: Duration) -> Progress {
         self.touch = Touch::default();
         if self.next < self.plan.len() {
@@ -403,7 +386,6 @@ impl Guide {
         self.untouched.take().map_or(Progress::Waits(Waiting::Nothing), Progress::Untouched)
     }
 
-    /// Updates the untouched reading until a touch begins.
     fn await_press(&mut self, at: Duration, baseline: &mut Baseline) -> Progress {
         let recovery = if self.is_recovering { self.checks.largest_size(baseline) } else { 0.0 };
         let least = NOISE_LIMIT_SD.max(RESIDUE_SHARE * recovery);
@@ -428,13 +410,12 @@ impl Guide {
         Progress::None
     }
 
-    /// Records a press once its reading is at rest.
     fn await_rest(&mut self, at: Duration, baseline: &mut Baseline) -> Progress {
         let Some(latest) = self.stretch.latest() else { return Progress::None };
         let mean = mean(&latest);
         let size = baseline.size(&mean);
         if size <= NOISE_LIMIT_SD || size < LIFT_TAIL_SHARE * self.touch.peak {
-            // The touch ended before its reading came to rest.
+            // The touch ended before rest.
             return match baseline.is_at_rest(&latest, 0.0) {
                 true => self.return_to_untouched(at, mean, baseline),
                 false => Progress::None,
@@ -450,7 +431,7 @@ impl Guide {
             return self.return_to_untouched(at, mean, baseline);
         }
         if self.touch.fastest < ONSET_SHARE * size {
-            // If it was a touch after all, its lift returns to the reference.
+            // The lift of a slow touch returns to the reference.
             let reference = std::mem::take(&mut self.reference);
             self.relearn();
             self.reference = reference;
@@ -486,7 +467,6 @@ impl Guide {
         Progress::Pressed { untouched, press: self.press_row(&press, mean) }
     }
 
-    /// Waits until a press is lifted, or replaces it by a firmer one.
     fn await_release(&mut self, at: Duration, baseline: &mut Baseline) -> Progress {
         if let Some(reading) = self.stretch.last() {
             self.growth.follow(at, baseline.deviation(reading), &self.pressed, baseline);
@@ -501,12 +481,11 @@ impl Guide {
         let by_hysteresis = (HYSTERESIS_SHARE * largest).min(PARTLY_LIFTED_SHARE * pressed);
         let limit = NOISE_LIMIT_SD.max(LIFTED_SHARE * pressed).max(by_hysteresis);
         let is_lifted = if size <= limit {
-            // Time since the reading fell below the limit.
             let waited = at.saturating_sub(self.since);
             baseline.is_at_rest(&latest, 0.0)
                 || waited > RECOVERY && baseline.is_at_rest(&latest, RECOVERY_SHARE * largest)
         } else {
-            // An unrecorded touch may not have been one: a reading that rests for long is the untouched one.
+            // Before a recording, any reading at long rest is untouched.
             let (share, patience) = if self.is_recorded {
                 (PARTLY_LIFTED_SHARE, PARTLY_LIFTED)
             } else {
@@ -528,7 +507,6 @@ impl Guide {
         self.return_to_untouched(at, mean, baseline)
     }
 
-    /// Takes back a press that grew after its reading was recorded, and never came to rest.
     fn take_back(&mut self, at: Duration, mean: Vec<f64>, baseline: &mut Baseline) -> Progress {
         self.next = self.next.saturating_sub(1);
         self.checks.outgrow_last(std::mem::take(&mut self.growth.deviation));
@@ -538,7 +516,6 @@ impl Guide {
         Progress::TakenBack(Doubt::Grew)
     }
 
-    /// Replaces a press by a firmer touch without a lift in between: the lighter touch was not the press.
     fn replace_press(&mut self, at: Duration, mean: Vec<f64>, baseline: &Baseline) -> Progress {
         if !self.is_recorded {
             return self.wait(at, Waiting::Rest);
@@ -575,7 +552,7 @@ impl Guide {
         RestingRow { row: Row { position, force_n, nuisances: Vec::new(), time_s, reading }, mean }
     }
 
-    /// True for a mean reading that has returned most of the way to the last untouched one: a finger that lingered has lifted.
+    /// True if a lingering finger has lifted.
     fn is_return(&self, mean: &[f64], baseline: &Baseline) -> bool {
         let from_reference = |reading: &[f64]| {
             let difference: Vec<f64> =
@@ -585,8 +562,7 @@ impl Guide {
         from_reference(mean) < 0.5 * from_reference(&baseline.mean)
     }
 
-    /// True for a mean reading that is opposite to the last press, by at most the effect of a lingering finger. This is possible once after a
-    /// press.
+    /// True for a mean opposite to the last press, by at most the effect of a lingering finger.
     fn is_late_lift(&self, mean: &[f64], baseline: &Baseline) -> bool {
         let deviation = baseline.deviation(mean);
         let lengths = baseline.length_of(&deviation) * baseline.length_of(&self.pressed);
@@ -596,7 +572,6 @@ impl Guide {
 }
 
 impl Growth {
-    /// Compares the deviation of a reading with that of the press.
     fn follow(&mut self, at: Duration, deviation: Vec<f64>, pressed: &[f64], baseline: &Baseline) {
         let size = baseline.size_of(&deviation);
         if size <= GROWTH * baseline.size_of(pressed) {
@@ -615,20 +590,18 @@ impl Growth {
 }
 
 impl Touch {
-    /// Updates the touch with the last reading of a stretch.
     fn follow(&mut self, baseline: &Baseline, reading: &[f64], stretch: &Stretch) {
         let size = baseline.size(reading);
         self.peak = self.peak.max(size.min(self.recent[0]).min(self.recent[1]));
         self.recent = [self.recent[1], size];
         if size > NOISE_LIMIT_SD {
             let least = stretch.last_second().map(|reading| baseline.size(reading)).fold(size, f64::min);
-            // After a move of a machine, only one reading is available: it is compared with the untouched reading.
+            // After a move of a machine, a single reading is compared with the baseline.
             let growth = if stretch.has_one_reading() { size } else { size - least };
             self.fastest = self.fastest.max(growth);
         }
     }
 
-    /// True once [`ONSET_READINGS`] consecutive readings deviate by more than `least` standard deviations.
     fn has_begun(&mut self, least: f64) -> bool {
         self.onset = if self.recent[1] > least { self.onset + 1 } else { 0 };
         self.onset >= ONSET_READINGS

@@ -1,4 +1,4 @@
-//! The file of the presses of a calibration.
+//! File of presses.
 
 use super::trace::Trace;
 use palpate_estimators::recording::{self, Column, Columns, Recording, Row};
@@ -8,7 +8,7 @@ use palpate_mechanics::units::{Dimension, Unit};
 use palpate_rig::Stage;
 use std::path::{Path, PathBuf};
 
-/// Presses so far, and their file.
+/// Rows and their file.
 #[derive(Debug)]
 pub struct Journal {
     setup: Setup,
@@ -16,22 +16,21 @@ pub struct Journal {
     comment: String,
     path: PathBuf,
     rows: Vec<Row>,
-    /// Trace of each row; only presses of this run have one.
     traces: Vec<Option<Trace>>,
-    /// Seconds that are added to the times of new rows, so that they follow those of the file.
+    /// Offset of the times of new rows.
     later_s: f64,
 }
 
-/// Error of presses that cannot be recorded.
+/// Error of a press that cannot be recorded.
 #[derive(Debug, thiserror::Error)]
 pub enum JournalError {
-    /// The rig's recordings have a column with unknown values.
+    /// A column of the recordings has unknown values.
     #[error("presses are recorded without the nuisance coordinate {column}")]
     Nuisance {
         /// The column.
         column: Column,
     },
-    /// The rig's recordings have columns without names.
+    /// The columns of the recordings have no names.
     #[error("presses are recorded in columns with names")]
     Numbered,
     /// The file cannot be written.
@@ -39,13 +38,13 @@ pub enum JournalError {
     Write {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         error: std::io::Error,
     },
 }
 
 impl JournalError {
-    /// The remedy.
+    /// Returns the remedy.
     pub fn help(&self) -> &'static str {
         match self {
             Self::Nuisance { .. } => "remove `nuisance` from [recording], or record with another program",
@@ -55,17 +54,16 @@ impl JournalError {
     }
 }
 
-/// Name of the column of depths, if the rig has none.
+/// Column of depths if the rig has none.
 const DEPTH: &str = "depth_mm";
-/// Seconds between the presses of a file and those that continue it. The time between two runs is unknown; the drift between them follows from the
-/// untouched rows of both.
+/// Assumed time between runs; untouched rows show the drift.
 const BETWEEN_RUNS_S: f64 = 60.0;
 
 impl Journal {
-    /// A journal that continues these earlier rows; the file is written with the next press.
+    /// Creates a journal with earlier rows; the next press writes the file.
     ///
     /// # Errors
-    /// [`JournalError`] if the columns of the rig's recordings cannot be determined.
+    /// [`JournalError`] of [`Self::columns`].
     pub fn new(
         setup: &Setup,
         path: &Path,
@@ -80,19 +78,20 @@ impl Journal {
         Ok(Self { setup: setup.clone(), columns, comment, path, rows: before, traces, later_s })
     }
 
-    /// Sets the traces of the rows, where they are known.
+    /// Sets the known traces.
     #[must_use]
     pub fn with_traces(self, mut traces: Vec<Option<Trace>>) -> Self {
         traces.resize(self.rows.len(), None);
         Self { traces, ..self }
     }
 
-    /// The columns of a file of presses. They are those that the rig reads. If a machine presses to several depths, there is one more, `depth_mm`,
-    /// which distinguishes the rows when a calibration is continued. If a machine presses, a nuisance coordinate of the rig that is a length is the
-    /// depth.
+    /// Returns the columns: those of the rig.
+    ///
+    /// For a machine, a length among the nuisance coordinates is the depth; otherwise several depths need the
+    /// column `depth_mm`.
     ///
     /// # Errors
-    /// [`JournalError`] for columns with unknown values, or without names.
+    /// [`JournalError`] for unknown values or missing names.
     pub fn columns(setup: &Setup, depths: DepthKnowledge) -> Result<Columns, JournalError> {
         let columns = setup.recording_columns();
         let is_depth = |nuisance: &recording::ValueColumn| nuisance.unit.dimension() == Dimension::Length;
@@ -116,17 +115,16 @@ impl Journal {
         })
     }
 
-    /// The rows so far, both presses and the untouched surface.
+    /// Rows, including untouched ones.
     pub fn rows(&self) -> &[Row] {
         &self.rows
     }
 
-    /// Trace of each row, if it has one.
+    /// Known trace of each row.
     pub fn traces(&self) -> &[Option<Trace>] {
         &self.traces
     }
 
-    /// Stores the trace of the last row.
     pub(super) fn set_trace(&mut self, trace: Trace) {
         if let Some(last) = self.traces.last_mut() {
             *last = Some(trace);
@@ -143,7 +141,7 @@ impl Journal {
         &self.path
     }
 
-    /// Adds a row, which is on disk when this returns; `depth_m` is the depth of a machine's press.
+    /// Writes a row to disk; `depth_m` is the depth of a machine.
     ///
     /// # Errors
     /// [`JournalError::Write`].
@@ -153,14 +151,14 @@ impl Journal {
             Some(_) => vec![depth_m.unwrap_or(0.0)],
             None => Vec::new(),
         };
-        // Rows that were removed at the end have no trace any more.
+        // Removed rows have no trace.
         self.traces.resize(self.rows.len(), None);
         self.rows.push(Row { time_s, nuisances, ..row });
         self.traces.push(None);
         self.save()
     }
 
-    /// Removes the last press, and the untouched rows after it.
+    /// Removes the last press and the untouched rows after it.
     ///
     /// # Errors
     /// [`JournalError::Write`].
@@ -173,7 +171,7 @@ impl Journal {
         Ok(())
     }
 
-    /// Replaces the last press by a row, which is on disk when this returns.
+    /// Replaces the last press on disk.
     ///
     /// # Errors
     /// [`JournalError::Write`].
@@ -184,7 +182,7 @@ impl Journal {
         self.add(row, depth_m)
     }
 
-    /// Strikes out a press, counted from 0; false if the press does not exist. The untouched rows are kept, because they show the drift.
+    /// Deletes a press, counted from 0, but no untouched rows; false if missing.
     ///
     /// # Errors
     /// [`JournalError::Write`].
@@ -199,7 +197,7 @@ impl Journal {
 
     fn save(&self) -> Result<(), JournalError> {
         let mut rows = self.rows.clone();
-        // The force distinguishes an untouched row from a press, if presses have one.
+        // Only presses with a force can be distinguished from untouched rows.
         if self.columns.force.is_none() || rows.iter().any(|row| row.force_n.is_none()) {
             rows.retain(Row::touches);
         }
@@ -223,7 +221,7 @@ pub enum DepthKnowledge {
 }
 
 impl DepthKnowledge {
-    /// Knowledge for presses by this machine, or by hand without one.
+    /// Knowledge for a machine, or for a hand.
     pub fn for_stage(stage: Option<&Stage>) -> Self {
         match stage {
             None => Self::Unknown,

@@ -1,4 +1,4 @@
-//! A machine that presses at the request of the guide of a calibration, or is set up first.
+//! Machine of a calibration.
 
 use super::guide::Waiting;
 use super::press::Press;
@@ -9,29 +9,26 @@ use palpate_rig::Stage;
 use serde::Serialize;
 use std::time::Duration;
 
-/// Time without readings after which the machine is stopped.
 const SILENT: Duration = Duration::from_secs(2);
-/// Time limit for a press to show in the readings, and for its reading to come to rest.
+/// Time limits for a press to show, and to rest.
 const SEEN_WITHIN: Duration = Duration::from_secs(3);
 const AT_REST_WITHIN: Duration = Duration::from_secs(60);
-/// Time limit for the surface to come to rest after a lift.
 const RELEASED_WITHIN: Duration = Duration::from_secs(300);
-/// Consecutive unseen presses that end the run.
 const MOST_UNSEEN: u32 = 3;
 
-/// Error that ended the work of a machine.
+/// Error of a machine's work.
 #[derive(Debug, thiserror::Error)]
 pub enum MachineError {
     /// The stage failed.
     #[error(transparent)]
     Stage(#[from] StageError),
-    /// A channel reads the end of its range.
+    /// A channel is saturated.
     #[error("channel `{name}` reads the end of its range: the machine was stopped")]
     Saturated {
         /// The channel.
         name: String,
     },
-    /// The load cell reads more than its limit.
+    /// Overload of the load cell.
     #[error(
         "the load cell reads {force_n:.3} N, more than the limit of {limit_n} N: the machine was stopped"
     )]
@@ -53,18 +50,18 @@ pub enum MachineError {
         /// Seconds without an open page.
         seconds: u64,
     },
-    /// The readings have not shown the last presses.
+    /// Undetected presses.
     #[error(
         "the readings have not shown the last {MOST_UNSEEN} presses: `touch` or `depths` of [stage] are wrong"
     )]
     Unseen,
-    /// The surface does not come to rest.
+    /// No rest of the surface.
     #[error("the untouched readings have not settled within {} s", RELEASED_WITHIN.as_secs())]
     NoRest,
 }
 
 impl MachineError {
-    /// The remedy.
+    /// Returns the remedy.
     pub fn help(&self) -> &'static str {
         match self {
             Self::Stage(StageError::Line(_)) => "check that it is on, and at this port",
@@ -97,13 +94,13 @@ impl MachineError {
 /// Step of a machine, for messages.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MachineNote {
-    /// The machine homes against its end stops.
+    /// Homing.
     Homing,
-    /// A press is left out, because the readings did not show it.
+    /// Press skipped as undetected.
     Unseen,
-    /// A press is left out, because its reading did not come to rest.
+    /// Press skipped without rest.
     NoRest,
-    /// A task of the set-up has ended, or made progress.
+    /// Result of a set-up task.
     SetUp(SetUpNote),
 }
 
@@ -111,53 +108,49 @@ pub enum MachineNote {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Motion {
-    /// The machine waits for the first reading.
+    /// Wait for a reading.
     Blind,
-    /// The machine homes against its end stops.
+    /// Homing.
     Homing,
-    /// It travels at the height of travel.
+    /// Travel.
     Travelling,
-    /// The machine travels to a place and presses there, or goes down in search of the touch.
+    /// Travel and press, or touch-off.
     Pressing,
-    /// It lifts its finger.
+    /// Lift.
     Lifting,
-    /// The finger is lifted, and the machine rests.
+    /// Rest, lifted.
     Up,
-    /// The finger presses, and the machine rests.
+    /// Rest in contact.
     Down,
 }
 
-/// A machine that presses at the request of the guide of a calibration, or is set up first.
+/// Machine that presses or is set up.
 ///
-/// The instants of its steps are those of the clock of its [`StageThread`].
+/// Instants are those of the clock of its [`StageThread`].
 #[derive(Debug)]
 pub struct Machine {
     thread: StageThread,
-    /// Tasks of a machine that is set up; `None` for one that presses.
     set_up: Option<SetUp>,
     force_limit_n: f64,
     motion: Motion,
-    /// The last press that it was sent to.
     press: Option<Press>,
-    /// Position after the last move, in metres of the machine.
+    /// In machine coordinates.
     at_m: Option<[f64; 3]>,
     now: Duration,
-    /// Instant of the last order, or of its end.
     since: Duration,
     readings: u64,
     read_at: Duration,
     unseen: u32,
-    /// Error that ends the work once the finger is lifted.
     ends_with: Option<MachineError>,
 }
 
 impl Machine {
-    /// A machine with a connected stage that is not homed yet.
+    /// Creates a machine, not homed yet.
     pub fn new(thread: StageThread, force_limit_n: Option<f64>, now: Duration) -> Self {
         Self::with_tasks(thread, force_limit_n, now, None)
     }
 
-    /// A machine to be set up: it homes, and executes the tasks of [`Self::ask`]. Presses are not recorded.
+    /// Creates a machine for set-up: homing, then the tasks of [`Self::ask`].
     pub fn to_set_up(thread: StageThread, stage: Stage, now: Duration) -> Self {
         let limit_n = stage.force_limit_n;
         Self::with_tasks(thread, limit_n, now, Some(SetUp::new(stage)))
@@ -185,7 +178,7 @@ impl Machine {
         }
     }
 
-    /// The way in which a stop acts on the machine.
+    /// Effect of a stop.
     pub fn stopping(&self) -> Stopping {
         self.thread.stopping()
     }
@@ -195,29 +188,29 @@ impl Machine {
         self.motion
     }
 
-    /// The last press that it was sent to; `None` before the first.
+    /// Last ordered press.
     pub fn press(&self) -> Option<Press> {
         self.press
     }
 
-    /// Position after its last move, in metres of the machine; `None` before homing.
+    /// Position after the last move, in machine coordinates; `None` before homing.
     pub fn position_m(&self) -> Option<[f64; 3]> {
         self.at_m
     }
 
-    /// Adds a task for a machine that is set up, after the earlier ones; false for a machine that presses.
+    /// Queues a set-up task; false without a set-up.
     pub fn ask(&mut self, task: SetUpTask) -> bool {
         let Some(set_up) = &mut self.set_up else { return false };
         set_up.ask(task);
         true
     }
 
-    /// True if the machine rests, and waits for a task of a set-up.
+    /// True while waiting for a set-up task.
     pub fn is_idle(&self) -> bool {
         self.motion == Motion::Up && self.set_up.as_ref().is_some_and(SetUp::is_idle)
     }
 
-    /// True once all work is done, so that the machine can be finished.
+    /// True after all work.
     pub fn is_done(&self, calibration: &Calibration) -> bool {
         match &self.set_up {
             None => calibration.guide().waiting() == Waiting::Nothing,
@@ -225,10 +218,10 @@ impl Machine {
         }
     }
 
-    /// Stops the machine at once, if the notes of the calibration require it.
+    /// Stops the machine if the notes require it.
     ///
     /// # Errors
-    /// [`MachineError`] with the reason.
+    /// [`MachineError`] of the stop.
     pub fn heed(&mut self, notes: &[Note]) -> Result<(), MachineError> {
         let error = notes.iter().find_map(|note| match note {
             Note::Saturated(name) => Some(MachineError::Saturated { name: name.clone() }),
@@ -240,7 +233,7 @@ impl Machine {
         error.map_or(Ok(()), |error| self.fail(error))
     }
 
-    /// Stops the machine at once.
+    /// Stops the machine.
     ///
     /// # Errors
     /// [`MachineError::ByHand`], always.
@@ -248,10 +241,10 @@ impl Machine {
         self.fail(MachineError::ByHand)
     }
 
-    /// Executes the next step, at an instant; must be called often.
+    /// Executes the next step; must be called often.
     ///
     /// # Errors
-    /// [`MachineError`] once the work has ended.
+    /// [`MachineError`], which ends the work.
     pub fn step(
         &mut self,
         now: Duration,
@@ -286,7 +279,6 @@ impl Machine {
         }
     }
 
-    /// True if the work depends on readings.
     fn needs_readings(&self) -> bool {
         match &self.set_up {
             None => self.motion != Motion::Blind,
@@ -294,7 +286,6 @@ impl Machine {
         }
     }
 
-    /// Executes the next task of the set-up, if the machine rests.
     fn set_up_next(&mut self, calibration: &mut Calibration) -> Option<MachineNote> {
         if self.motion == Motion::Blind {
             self.order(Order::Home, calibration);
@@ -303,7 +294,6 @@ impl Machine {
         let at_m = self.at_m.filter(|_| matches!(self.motion, Motion::Up | Motion::Down))?;
         let set_up = self.set_up.as_mut()?;
         if set_up.is_between_tasks() {
-            // The next task begins to wait now, and needs readings from now on.
             (self.since, self.read_at) = (self.now, self.now);
         }
         let waited = self.now.saturating_sub(self.since);
@@ -315,7 +305,6 @@ impl Machine {
         None
     }
 
-    /// Executes the step that the guide waits for.
     fn press_next(&mut self, calibration: &mut Calibration) -> Result<Option<MachineNote>, MachineError> {
         let waited = self.now.saturating_sub(self.since);
         match (self.motion, calibration.guide().waiting()) {
@@ -355,10 +344,10 @@ impl Machine {
         Ok(None)
     }
 
-    /// Lifts the finger, and waits until it is lifted.
+    /// Lifts the finger, and waits.
     ///
     /// # Errors
-    /// [`MachineError`] if the lift fails.
+    /// [`MachineError`] of the lift.
     pub fn finish(mut self) -> Result<(), MachineError> {
         let ends_with = self.ends_with.take();
         self.thread.finish()?;

@@ -1,10 +1,8 @@
-//! Guided calibration: presses at the planned places, each recorded when its reading is at rest.
+//! Guided calibration: presses at planned places, each recorded at rest.
 //!
-//! The [`Guide`] receives readings with their instants and reports the step that it waits for; it uses no device, file or clock. A [`Calibration`]
-//! passes the readings of a source to it, and writes every press to the file of a [`Journal`] before it requests the next one. A [`Machine`]
-//! presses in place of a person. An [`Assessment`] estimates the error of the locator, and the gain of more presses; a [`Check`] measures the error
-//! at fresh places. [`Statements`] contain the information of the operator before the first press. A [`SetUpTask`] lets a machine show its path, or
-//! find the height of the touch, before the first press.
+//! The [`Guide`] decides on readings and instants, without device, file or clock. A [`Calibration`] passes it
+//! the readings, and a [`Journal`] writes each press before the next request. A [`Machine`] may press, after
+//! [`SetUpTask`]s. An [`Assessment`] estimates the error of the locator; a [`Check`] measures it.
 
 mod assessment;
 mod baseline;

@@ -1,4 +1,4 @@
-//! The presses of a calibration.
+//! Plan of presses.
 
 use super::press::Press;
 use palpate_estimators::arrangement::{Arrangement, ArrangementError};
@@ -7,49 +7,47 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_rig::{Rig, RigSimulationError};
 
-/// Error of a rig that does not specify where to press.
+/// Error of a plan.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
     /// The rig has no training positions.
     #[error(transparent)]
     NoTraining(#[from] RigSimulationError),
-    /// The training positions cannot be arranged.
+    /// Invalid arrangement of positions.
     #[error(transparent)]
     Arrangement(#[from] ArrangementError),
 }
 
-/// Weights of the presses of a calibration.
+/// Forces of the presses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Weights {
-    /// Force of the presses in newtons, if it differs from that of the rig.
+    /// Force in newtons, if not that of the rig.
     pub force_n: Option<f64>,
-    /// Second force, with which a person also presses every other place.
+    /// Second force for every other place of a person.
     pub second_n: Option<f64>,
 }
 
 impl Weights {
-    /// The first force, in newtons: the stated one or that of the rig.
+    /// First force in newtons, stated or of the rig.
     pub fn first_n(self, rig: &Rig) -> Option<f64> {
         let of_training = rig.training.as_ref().and_then(|training| training.force_n);
         self.force_n.or(of_training).or(rig.setup.force_n())
     }
 
-    /// The second force if it differs from the first.
     fn second_n(self, rig: &Rig) -> Option<f64> {
         let first_n = self.first_n(rig)?;
         self.second_n.filter(|second_n| !is_same_force(first_n, *second_n))
     }
 }
 
-/// Presses that are still to be taken: each training position of a rig, with the rig's number of repeats, and to each of `depths_m` if a machine
-/// presses. Earlier rows are counted in any order, so that presses that were left out are requested again. The depth of a row is its nuisance
-/// coordinate ([`Journal`](super::Journal)).
+/// Returns the presses that `before` lacks: training positions × repeats, and × `depths_m` for a machine. The
+/// depth of a row is its nuisance coordinate.
 ///
-/// The force is the first weight; presses to several depths have no force. With a second weight, every other place is also pressed with that, after
-/// all presses with the first. A person receives places that are marked on a ruler (`Ruler`).
+/// Presses to several depths have no force. The second weight of a person follows at every other place; a
+/// person's places are on a ruler.
 ///
 /// # Errors
-/// [`PlanError`] if the rig has no positions, or they cannot be arranged.
+/// [`PlanError`] of the positions.
 pub fn plan(rig: &Rig, weights: Weights, depths_m: &[f64], before: &[Row]) -> Result<Vec<Press>, PlanError> {
     let training = rig.training()?;
     let ruler = match depths_m {
@@ -84,7 +82,7 @@ pub fn plan(rig: &Rig, weights: Weights, depths_m: &[f64], before: &[Row]) -> Re
     Ok(first.chain(second).flat_map(left).collect())
 }
 
-/// Grid of places that a person can find on a ruler.
+/// Grid of places on a ruler.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ruler {
     steps_per_m: f64,
@@ -92,9 +90,8 @@ pub(super) struct Ruler {
 }
 
 impl Ruler {
-    /// Ruler for the places of a rig; `None` if the rig lists them. The step is a whole millimetre, or a decimal part of one. It is at most a fifth
-    /// of the distance between two places, and at most the distance between a place and the edge. No place therefore moves by more than a tenth of
-    /// the distance to the next. No two places coincide, and none moves to the edge.
+    /// Ruler of a rig; `None` for listed places. The step is 1, 0.1, 0.01 or 0.001 mm: at most a fifth of the
+    /// gap between places, and at most the gap to the edge. Places thus stay distinct and off the edge.
     pub fn for_places(rig: &Rig) -> Result<Option<Self>, PlanError> {
         let (training, extent) = (rig.training()?, rig.setup.surface().extent());
         if let Arrangement::Explicit(_) = training.arrangement {
@@ -103,9 +100,9 @@ impl Ruler {
         Ok(Self::among(&training.positions(extent)?, extent))
     }
 
-    /// Ruler for these places; `None` if they are closer than the finest ruler.
+    /// Ruler of these places; `None` if they are too close.
     pub fn among(positions: &[Position], extent: Extent) -> Option<Self> {
-        /// Down to a micrometre; a finger cannot be positioned more finely.
+        /// Up to a micrometre, finer than any finger.
         const STEPS_PER_M: [f64; 4] = [1e3, 1e4, 1e5, 1e6];
         const LARGEST_SHARE: f64 = 0.2;
         let along: Vec<f64> = positions.iter().map(|at| at.x_m).collect();
@@ -121,7 +118,7 @@ impl Ruler {
         step.map(|steps_per_m| Self { steps_per_m, extent })
     }
 
-    /// The nearest place on the ruler; the edge remains the edge.
+    /// Nearest place on the ruler; the edge stays the edge.
     pub fn nearest(&self, position: Position) -> Position {
         let nearest =
             |at_m: f64, side_m: f64| ((at_m * self.steps_per_m).round() / self.steps_per_m).min(side_m);
@@ -130,7 +127,6 @@ impl Ruler {
     }
 }
 
-/// Smallest distance between two different coordinates.
 fn least_gap_m(coordinates: &[f64]) -> f64 {
     let mut sorted = coordinates.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -138,10 +134,9 @@ fn least_gap_m(coordinates: &[f64]) -> f64 {
     gaps.filter(|gap_m| *gap_m > ROUNDING_M).fold(f64::INFINITY, f64::min)
 }
 
-/// Distance below which two places are equal; a file rounds its values.
+/// Rounding of positions in a file.
 const ROUNDING_M: f64 = 1e-9;
 
-/// True for a row of this depth at this place, on the ruler.
 fn is_of(row: &Row, press: &Press, ruler: Option<Ruler>) -> bool {
     let is_deep = match (row.nuisances.first(), press.depth_m) {
         (Some(row_m), Some(press_m)) => (row_m - press_m).abs() < ROUNDING_M,
@@ -196,7 +191,7 @@ mod tests {
     fn presses_of_before_are_not_asked_for_again() {
         let all = plan(&rig(), Weights::default(), &[1e-3, 2e-3], &[]).unwrap();
         let mut before: Vec<Row> = all[..7].iter().map(pressed).collect();
-        // The file has rounded a position, and untouched rows do not count as presses.
+        // Rounded position, and untouched rows.
         before[2].position.x_m += 1e-13;
         before.push(Row { force_n: Some(0.0), position: Position::default(), ..before[0].clone() });
         assert_eq!(plan(&rig(), Weights::default(), &[1e-3, 2e-3], &before).unwrap(), all[7..]);
@@ -205,13 +200,13 @@ mod tests {
     #[test]
     fn presses_that_were_left_out_are_asked_for_again_wherever_they_stood() {
         let all = plan(&rig(), Weights::default(), &[1e-3, 2e-3], &[]).unwrap();
-        // Missing: the second press of the first depth, the last of the second depth, and all of the third place.
+        // Missing: the second press of the first depth, the last of the second depth, and the third place.
         let left_out = |i: usize| [1, 5].contains(&i) || (12..18).contains(&i);
         let before: Vec<Row> =
             all[..24].iter().enumerate().filter(|(i, _)| !left_out(*i)).map(|(_, p)| pressed(p)).collect();
         let expected = [&all[1..2], &all[5..6], &all[12..18], &all[24..]].concat();
         assert_eq!(plan(&rig(), Weights::default(), &[1e-3, 2e-3], &before).unwrap(), expected);
-        // Extra presses of one place do not count for another place.
+        // Extra presses do not count for another place.
         let often: Vec<Row> = std::iter::repeat_n(pressed(&all[0]), 9).collect();
         assert_eq!(plan(&rig(), Weights::default(), &[1e-3, 2e-3], &often).unwrap(), all[3..]);
     }
@@ -253,7 +248,6 @@ mod tests {
         for (length, training, steps) in [
             ("30 mm", "count = 11", 10.0),
             ("2 mm", "count = 6", 100.0),
-            // The outermost Chebyshev places are near the ends.
             ("100 mm", "arrangement = \"chebyshev\"\ncount = 12", 10.0),
         ] {
             let places = places_mm(&beam(length, training));
@@ -289,11 +283,10 @@ mod tests {
         assert!(presses[..27].iter().all(|press| press.force_n == Some(1.0)));
         assert!(presses[27..].iter().all(|press| press.force_n == Some(2.5)));
         assert_eq!(presses[30].position, presses[6].position);
-        // Rows of one weight do not count for the other.
+        // Rows with one weight do not count for the other.
         let before: Vec<Row> =
             presses[..28].iter().map(|press| Row { force_n: press.force_n, ..pressed(press) }).collect();
         assert_eq!(plan(&rig(), weights, &[], &before).unwrap(), presses[28..]);
-        // A second weight equal to the first is ignored.
         let twice = Weights { force_n: None, second_n: Some(1.0) };
         assert_eq!(plan(&rig(), twice, &[], &[]).unwrap().len(), 27);
     }

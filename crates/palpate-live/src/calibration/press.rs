@@ -1,14 +1,14 @@
-//! A planned press.
+//! Planned press.
 
 use palpate_mechanics::contact::Position;
 
-/// A planned press.
+/// Planned press.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Press {
     /// Position.
     pub position: Position,
-    /// Force in newtons, if it is known.
+    /// Force in newtons, if known.
     pub force_n: Option<f64>,
-    /// Depth in metres, if a machine presses.
+    /// Depth in metres, for a machine.
     pub depth_m: Option<f64>,
 }

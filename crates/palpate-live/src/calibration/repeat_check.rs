@@ -1,4 +1,4 @@
-//! Comparison of a press with earlier presses, before it is recorded.
+//! Comparison of a press with earlier presses.
 
 use super::baseline::Baseline;
 use super::press::Press;
@@ -6,32 +6,32 @@ use palpate_estimators::recording::Row;
 use palpate_mechanics::contact::Position;
 use std::fmt;
 
-/// Share of the smallest press so far; a lighter touch is doubtful.
+/// Share of the smallest press below which a touch is doubtful.
 const LIGHT_SHARE: f64 = 0.15;
-/// Deviation from the repeats of a press, as a share of its size; a larger one is doubtful.
+/// Relative deviation from repeats that is doubtful.
 const REPEAT_SHARE: f64 = 0.2;
-/// Largest share of a press that is attributed to hysteresis.
+/// Largest share of hysteresis.
 const MOST_RESIDUE_SHARE: f64 = 0.3;
-/// Growth of a reading without a lift above which the recorded touch was only a light one before the press.
+/// Growth without a lift after a preliminary touch.
 pub const GROWTH: f64 = 1.2;
-/// Largest number of repeated requests of one press; after these it is recorded unchanged.
+/// Limit on repeated requests; the press is then recorded.
 const MOST_REQUESTS: u32 = 2;
 
-/// Reason to request a press again.
+/// Reason for a repeated request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Doubt {
-    /// The reading changed too slowly for a press.
+    /// Slow change.
     Drift,
-    /// The press grew after its reading was recorded, and was lifted before it came to rest.
+    /// Growth after the recording, without rest.
     Grew,
-    /// The touch is much lighter than earlier presses.
+    /// Touch much lighter than earlier ones.
     Light {
         /// Size in % of an earlier press.
         percent: f64,
     },
-    /// The touch differs from the other presses of its place.
+    /// Difference from the repeats.
     OffRepeats {
-        /// The difference in % of their size.
+        /// Difference in %.
         percent: f64,
     },
 }
@@ -54,13 +54,11 @@ impl fmt::Display for Doubt {
 /// Mean reading of a touch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TouchReading {
-    /// The reading.
     pub reading: Vec<f64>,
-    /// Deviation from the previous untouched reading.
+    /// Deviation from the untouched reading.
     pub deviation: Vec<f64>,
 }
 
-/// A recorded press.
 #[derive(Clone, Debug, PartialEq)]
 struct PastPress {
     position: Position,
@@ -75,21 +73,19 @@ impl PastPress {
     }
 }
 
-/// Presses so far, for comparison with the next one.
+/// Earlier presses.
 #[derive(Clone, Debug, Default)]
 pub struct RepeatCheck {
     past: Vec<PastPress>,
-    /// The last press that was requested again, and the number of requests.
     refused: Option<TouchReading>,
     requests: u32,
-    /// Deviation up to which the last press grew after its reading was recorded: a lighter touch does not count as the press.
+    /// Largest deviation of the removed last press; a lighter touch is doubtful.
     outgrown: Option<Vec<f64>>,
-    /// Largest change between consecutive recorded untouched readings.
+    /// Largest change between untouched rows.
     residue: Vec<f64>,
 }
 
 impl RepeatCheck {
-    /// A check against the presses of a file; `rows` are in the order of the file.
     pub fn new(rows: &[Row]) -> Self {
         let mut own = Self::default();
         let mut untouched: Option<&[f64]> = None;
@@ -109,9 +105,9 @@ impl RepeatCheck {
         own
     }
 
-    /// The reason to request a press again, given its touch; `None` if it may be recorded.
+    /// Reason to request a press again.
     ///
-    /// A second press that confirms the first is recorded, to avoid endless requests.
+    /// A second press that confirms the first is recorded.
     pub fn doubt(&self, press: &Press, touch: &TouchReading, baseline: &Baseline) -> Option<Doubt> {
         let is_confirmed = self
             .refused
@@ -127,7 +123,7 @@ impl RepeatCheck {
             return Some(Doubt::Light { percent: 100.0 * share });
         }
         let repeats = self.past.iter().filter(|past| past.is_repeat(press));
-        // Agreement with one repeat is sufficient, because another may be the wrong one.
+        // The other repeats may be wrong.
         let share = repeats.map(|past| self.excess_share(press, touch, &past.touch, baseline));
         if let Some(share) = share.min_by(f64::total_cmp) {
             return (share > REPEAT_SHARE).then_some(Doubt::OffRepeats { percent: 100.0 * share });
@@ -136,7 +132,7 @@ impl RepeatCheck {
         (share < LIGHT_SHARE).then_some(Doubt::Light { percent: 100.0 * share })
     }
 
-    /// Difference from an earlier press as a share of its size, less the share that hysteresis of earlier touches may have left.
+    /// Relative difference from an earlier press, less hysteresis.
     fn excess_share(
         &self,
         press: &Press,
@@ -149,49 +145,48 @@ impl RepeatCheck {
         difference_share(press, touch, past, baseline) - residue_share.min(MOST_RESIDUE_SHARE)
     }
 
-    /// Size of the smallest press so far, in standard deviations of the noise.
+    /// Smallest press, in standard deviations.
     pub fn smallest_size(&self, baseline: &Baseline) -> Option<f64> {
         self.past.iter().map(|past| baseline.size_of(&past.touch.deviation)).min_by(f64::total_cmp)
     }
 
-    /// Size of the largest press so far, in standard deviations of the noise; 0 before the first.
+    /// Largest press, in standard deviations; 0 without presses.
     pub fn largest_size(&self, baseline: &Baseline) -> f64 {
         self.past.iter().map(|past| baseline.size_of(&past.touch.deviation)).fold(0.0, f64::max)
     }
 
-    /// Notes the change of the untouched reading since the last recorded one.
+    /// Adds a change between untouched rows.
     pub fn add_residue(&mut self, change: Vec<f64>, baseline: &Baseline) {
         if baseline.length_of(&change) > baseline.length_of(&self.residue) {
             self.residue = change;
         }
     }
 
-    /// Notes that a press was requested again.
+    /// Counts a repeated request.
     pub fn refuse(&mut self, touch: TouchReading) {
         self.refused = Some(touch);
         self.requests += 1;
     }
 
-    /// Records a press.
+    /// Adds a press.
     pub fn record(&mut self, press: &Press, touch: TouchReading) {
         let Press { position, force_n, depth_m } = *press;
         self.past.push(PastPress { position, force_n, depth_m, touch });
         self.forget_request();
     }
 
-    /// Removes the last press.
     pub fn forget_last(&mut self) {
         self.past.pop();
         self.forget_request();
     }
 
-    /// Removes the last press, which grew up to this deviation after its reading was recorded.
+    /// Removes the last press, which grew later.
     pub fn outgrow_last(&mut self, deviation: Vec<f64>) {
         self.forget_last();
         self.outgrown = Some(deviation);
     }
 
-    /// Resets the count of repeated requests.
+    /// Ends the repeated requests.
     pub fn forget_request(&mut self) {
         self.refused = None;
         self.requests = 0;
@@ -199,10 +194,10 @@ impl RepeatCheck {
     }
 }
 
-/// Length of the difference between two touches as a share of the second.
+/// Relative difference between two touches.
 ///
-/// If the force is known, the smaller of two differences counts, that of the deviations and that of the readings: with hysteresis, the readings of
-/// a load agree after any earlier touch. If the force is unknown, only the directions of the deviations are compared.
+/// Known force: minimum over deviations and readings, because readings under load agree despite hysteresis.
+/// Unknown force: difference in direction.
 fn difference_share(
     press: &Press,
     touch: &TouchReading,

@@ -1,23 +1,23 @@
-//! Repeatability: the scatter of the presses at one place.
+//! Repeatability of presses at one place.
 
 use super::press::Press;
 use palpate_estimators::recording::Row;
 use palpate_mechanics::contact::Position;
 
-/// A place of a plan, and the agreement of its presses.
+/// Place of a plan, with its scatter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
     /// Position.
     pub position: Position,
-    /// Number of presses taken there.
+    /// Number of recorded presses.
     pub taken: usize,
-    /// Number of presses to come.
+    /// Number of remaining presses.
     pub left: usize,
-    /// Standard deviation of the readings in % of their size; `None` for fewer than two, or for different forces.
+    /// Relative standard deviation in %; `None` for one press, or different forces.
     pub spread_percent: Option<f64>,
 }
 
-/// Places of past and future presses, in their order along the surface.
+/// Sorted places of past and future presses.
 pub fn places(rows: &[Row], to_come: &[Press]) -> Vec<Place> {
     let mut positions: Vec<Position> = rows
         .iter()
@@ -40,13 +40,12 @@ pub fn places(rows: &[Row], to_come: &[Press]) -> Vec<Place> {
     positions.into_iter().map(place).collect()
 }
 
-/// Deviation of the last press from the mean of the others at its place and force, in % of its size; `None` without others.
+/// Relative deviation of the last press from the mean of its repeats, in %.
 pub fn last_deviation_percent(rows: &[Row]) -> Option<f64> {
     deviation_percent(rows, rows.len().checked_sub(1)?)
 }
 
-/// Deviation of the press at an index of the rows from the mean of the others at its place and force, in % of its size; `None` for an untouched
-/// row, or without others.
+/// Relative deviation of a press from the mean of its repeats, in %; `None` without repeats, or untouched.
 pub fn deviation_percent(rows: &[Row], at: usize) -> Option<f64> {
     let press = rows.get(at).filter(|row| row.touches())?;
     let others = rows.iter().enumerate().filter(|(i, row)| *i != at && is_repeat(row, press));
@@ -73,7 +72,6 @@ fn spread_percent(rows: &[Row], here: &[(usize, &Row)]) -> Option<f64> {
     (size > 0.0).then(|| 100.0 * (squares / (presses.len() - 1) as f64).sqrt() / size)
 }
 
-/// True for presses at one place with one force.
 fn is_repeat(row: &Row, other: &Row) -> bool {
     row.touches()
         && row.position == other.position
@@ -81,7 +79,6 @@ fn is_repeat(row: &Row, other: &Row) -> bool {
         && row.nuisances == other.nuisances
 }
 
-/// The last untouched row before an index.
 pub(super) fn untouched_before(rows: &[Row], at: usize) -> Option<&Row> {
     rows[..at].iter().rev().find(|row| !row.touches())
 }
@@ -92,7 +89,7 @@ fn mean(rows: &[&Row], channels: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Euclidean distance between two readings.
+/// Euclidean distance.
 pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
@@ -114,12 +111,12 @@ mod tests {
     #[test]
     fn repeats_are_measured_against_the_size_of_their_press() {
         let press = Press { position: Position::along(0.3), force_n: None, depth_m: None };
-        // Untouched at (1, 1); a press with a deviation of (3, 4) has size 5.
+        // Deviation (3, 4) has norm 5.
         let rows = [row(0.0, 0.0, [1.0, 1.0]), row(0.1, 2.0, [4.0, 5.0]), row(0.1, 2.0, [4.0, 5.1])];
         assert!((last_deviation_percent(&rows).unwrap() - 2.0).abs() < 1e-9);
         let places = places(&rows, &[press]);
         assert_eq!((places[0].taken, places[0].left, places[1].taken, places[1].left), (2, 0, 0, 1));
-        // Two readings 0.1 apart have a standard deviation of 0.1 / √2.
+        // Standard deviation 0.1 / √2.
         let spread = places[0].spread_percent.unwrap();
         assert!((spread - 100.0 * 0.1 / 2f64.sqrt() / 5.04).abs() < 0.01, "{spread}");
         assert_eq!(places[1].spread_percent, None);

@@ -1,4 +1,4 @@
-//! A calibration in progress: arrivals of a source in, rows on disk and notes out.
+//! Calibration in progress.
 
 use super::guide::{Guide, Progress, RestingRow, Waiting};
 use super::journal::{Journal, JournalError};
@@ -19,94 +19,86 @@ use palpate_rig::Stage;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Error that ends a calibration.
+/// Error of a calibration.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationError {
     /// A press cannot be recorded.
     #[error(transparent)]
     Journal(#[from] JournalError),
-    /// A press pulls at the load cell.
+    /// Pull at the load cell.
     #[error("the load cell `{name}` reads {force_n} N in a press; it must read more than 0 N")]
     LoadCell {
-        /// Name.
+        /// Channel.
         name: String,
-        /// The force at the load cell.
+        /// Force in newtons.
         force_n: f64,
     },
 }
 
-/// Time between two explanations of a long step.
 const EXPLAIN_EVERY: Duration = Duration::from_secs(5);
 
-/// Note on the readings or steps of a calibration.
+/// Message of a calibration.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Note {
-    /// The source was opened; its name.
+    /// Name of the opened source.
     Opened(String),
-    /// The source was lost, and is searched for again; the cause.
+    /// Cause of a loss of the source.
     Lost(String),
-    /// No readings arrive: cause and remedy.
+    /// Cause and remedy of missing readings.
     NoReadings(String),
     /// Readings arrive again.
     ReadingsAgain,
     /// The source has ended.
     Ended,
-    /// The guide waits for another step.
+    /// Another step is awaited.
     Waits(Waiting),
-    /// A press was recorded, and is on disk.
+    /// A press is on disk.
     Taken,
-    /// The last press grew without a lift, and its row was replaced.
+    /// The last row was replaced by a firmer press.
     Replaced,
-    /// The untouched surface was recorded. It is on disk if presses have a force.
+    /// The untouched surface was recorded, on disk if presses have a force.
     Untouched,
-    /// The source repeats readings because it is faster than its sensors: each counts once.
+    /// The source repeats readings, because its sensors are slower.
     RepeatedReadings,
     /// The press is requested again.
     AskedAgain(Doubt),
-    /// A step is long: the awaited condition and the present reading.
+    /// Explanation of a long step.
     StillWaiting(String),
-    /// A channel reads the end of its range; its name.
+    /// Name of a saturated channel.
     Saturated(String),
-    /// The load cell reads more than its limit, in newtons.
+    /// Force above the limit of the load cell, in newtons.
     Overload(f64),
 }
 
-/// The load cell of a machine: the last channel of the frames.
+/// Load cell: the last channel.
 #[derive(Clone, Debug)]
 struct LoadCell {
     name: String,
     limit_n: Option<f64>,
-    /// First reading, before the machine moves.
     first_n: Option<f64>,
-    /// Last reading.
     now_n: Option<f64>,
 }
 
-/// A calibration that runs.
+/// Calibration in progress.
 pub struct Calibration {
     guide: Guide,
     journal: Journal,
-    /// Frames with the channels and the load cell.
     frames: FrameReader,
     feed: FeedWatch,
-    /// True from a report of missing readings until the next reading.
     lacks_readings: bool,
     health: HealthWatch,
     load_cell: Option<LoadCell>,
     last: Vec<f64>,
     recent: RecentReadings,
-    /// True while the guide and the detector receive readings: not while a machine moves.
     is_guided: bool,
-    /// Detector of a touch-off.
     touch_detector: Option<TouchDetector>,
-    /// True once it was noted that the source repeats readings.
     notes_repeats: bool,
-    /// Awaited step, and the instant of its last explanation.
     explained: (Waiting, Duration),
 }
 
 impl Calibration {
-    /// A calibration for a plan. Frames without names have these `columns`. A stage may have a load cell, which is then the last channel.
+    /// Creates the calibration of a plan. `columns` are those of unnamed frames; a load cell is the last
+    /// channel.
     ///
     /// # Errors
     /// [`ColumnsError`] unless every channel is named once.
@@ -154,39 +146,38 @@ impl Calibration {
         &self.guide
     }
 
-    /// The presses so far.
+    /// Recorded presses.
     pub fn journal(&self) -> &Journal {
         &self.journal
     }
 
-    /// Frames that contained no valid reading, by cause.
+    /// Number of invalid frames, by cause.
     pub fn bad_frames(&self) -> &BTreeMap<BadFrame, u64> {
         self.frames.bad_frames()
     }
 
-    /// Number of readings that arrived.
+    /// Number of readings.
     pub fn readings(&self) -> u64 {
         self.frames.readings()
     }
 
-    /// Fault of the source: no reading arrived, or none near the end.
+    /// Fault of the source: no reading, or none at the end.
     pub fn fault(&self) -> Option<String> {
         self.feed.fault(&self.frames)
     }
 
-    /// The last reading, in SI units or raw, without the load cell; empty before the first.
+    /// Last reading in SI units or raw, without the load cell.
     pub fn last_reading(&self) -> &[f64] {
         &self.last
     }
 
-    /// Force at the load cell, in newtons, less its untouched reading; `None` without one, or before the first reading.
+    /// Tared force at the load cell, in newtons.
     pub fn cell_force_n(&self) -> Option<f64> {
         let cell = self.load_cell.as_ref()?;
         Some(cell.now_n? - self.cell_untouched_n())
     }
 
-    /// Untouched reading of the load cell, in newtons. It is the first reading until one is learnt at rest, because a cell that is not tared has an
-    /// offset.
+    /// Untouched value of the load cell, in newtons; the first reading until one at rest.
     fn cell_untouched_n(&self) -> f64 {
         let of_guide = self.guide.untouched_reading().and_then(|reading| reading.last().copied());
         let of_detector = || self.touch_detector.as_ref().and_then(TouchDetector::untouched_last);
@@ -194,14 +185,14 @@ impl Calibration {
         of_guide.or_else(of_detector).or_else(first).unwrap_or(0.0)
     }
 
-    /// Processes an arrival from a source; resulting notes are added to `notes`.
+    /// Processes an arrival, and appends to `notes`.
     ///
     /// # Errors
-    /// [`CalibrationError`] if a press cannot be recorded.
+    /// [`CalibrationError`] of a press.
     pub fn receive(&mut self, arrived: &Arrived, notes: &mut Vec<Note>) -> Result<(), CalibrationError> {
         match &arrived.arrival {
             Arrival::Opened(name) | Arrival::Piped(name) | Arrival::Joined(name) => {
-                // The offsets of a board that was disconnected may have changed.
+                // The offsets of a reconnected board may have changed.
                 self.guide.relearn();
                 notes.push(Note::Opened(name.clone()));
             }
@@ -223,7 +214,7 @@ impl Calibration {
         Ok(())
     }
 
-    /// Notes once that no readings arrive; must be called often during a silence.
+    /// Notes missing readings once; must be called often.
     pub fn check_feed(&mut self, now: Duration, notes: &mut Vec<Note>) {
         if let Some(words) = self.feed.report(now, &self.frames) {
             self.lacks_readings = true;
@@ -255,7 +246,7 @@ impl Calibration {
             return Ok(());
         }
         if let Some(detector) = &mut self.touch_detector {
-            // A load cell is the most sensitive to the touch: its value alone decides.
+            // A load cell alone decides: it is the most sensitive.
             let from = if self.load_cell.is_some() { channels } else { 0 };
             detector.add(at, &reading[from..]);
         }
@@ -296,7 +287,6 @@ impl Calibration {
         Ok(())
     }
 
-    /// Stores the trace of the last recorded press, beginning before its untouched row.
     fn trace_last_press(&mut self) {
         let rows = self.journal.rows();
         let Some(untouched) = untouched_before(rows, rows.len()) else { return };
@@ -306,7 +296,6 @@ impl Calibration {
         self.journal.set_trace(trace);
     }
 
-    /// Explains a long step, except the wait for a press.
     fn explain(&mut self, at: Duration, notes: &mut Vec<Note>) {
         let waiting = self.guide.waiting();
         let (explained, since) = self.explained;
@@ -318,8 +307,7 @@ impl Calibration {
         }
     }
 
-    /// The row of a press with the force of the load cell, if there is one. The force is the mean of the stretch at rest, because it is not a
-    /// reading to be located.
+    /// Adds the force of the load cell, as mean of the stretch.
     fn weighed(&self, press: RestingRow) -> Result<Row, CalibrationError> {
         let Some(cell) = &self.load_cell else { return Ok(press.row) };
         let force_n = press.mean.last().map_or(0.0, |read_n| read_n - self.cell_untouched_n());
@@ -329,13 +317,12 @@ impl Calibration {
         Ok(Row { force_n: Some(force_n), ..self.without_cell(press.row) })
     }
 
-    /// A row without the value of the load cell.
     fn without_cell(&self, mut row: Row) -> Row {
         row.reading.truncate(row.reading.len() - usize::from(self.load_cell.is_some()));
         row
     }
 
-    /// Sets whether the guide receives readings: those during a move of a machine are meaningless.
+    /// Sets the use of readings, which are meaningless during a move.
     pub(super) fn set_guided(&mut self, is_guided: bool) {
         if is_guided != self.is_guided {
             self.guide.forget_readings();
@@ -346,20 +333,18 @@ impl Calibration {
         self.is_guided = is_guided;
     }
 
-    /// Starts or ends the detection of a touch in the readings.
     pub(super) fn detect_touch(&mut self, is_wanted: bool) {
         self.touch_detector = is_wanted.then(TouchDetector::default);
     }
 
-    /// The detector of a touch-off; `None` outside one.
     pub(super) fn touch_detector(&mut self) -> Option<&mut TouchDetector> {
         self.touch_detector.as_mut()
     }
 
-    /// Takes back the last press, which is requested again; false if there is none.
+    /// Requests the last press again; false without one.
     ///
     /// # Errors
-    /// [`JournalError`] if the file cannot be written.
+    /// [`JournalError`] of the file.
     pub fn redo(&mut self) -> Result<bool, JournalError> {
         if !self.guide.redo() {
             return Ok(false);
@@ -368,25 +353,25 @@ impl Calibration {
         Ok(true)
     }
 
-    /// Learns the untouched reading again, after the operator has stated that the surface is untouched.
+    /// Learns the baseline again.
     pub fn relearn_untouched(&mut self) {
         self.guide.relearn();
     }
 
-    /// Strikes out a press, counted from 0; false if the press does not exist. [`Self::replan`] requests it again.
+    /// Deletes a press, counted from 0; false if missing. [`Self::replan`] requests it again.
     ///
     /// # Errors
-    /// [`JournalError`] if the file cannot be written.
+    /// [`JournalError`] of the file.
     pub fn strike(&mut self, press: usize) -> Result<bool, JournalError> {
         self.journal.strike(press)
     }
 
-    /// Requests these presses from now on; the untouched reading is learnt again.
+    /// Replaces the remaining presses, and learns the baseline again.
     pub fn replan(&mut self, to_come: Vec<Press>) {
         self.guide = Guide::new(to_come).with_rows(self.journal.rows());
     }
 
-    /// Leaves out the next press.
+    /// Skips the next press.
     pub fn skip(&mut self) {
         self.guide.skip();
     }

@@ -1,4 +1,4 @@
-//! Work of a machine before a calibration: a dry run, jogs and touch-off. Nothing is recorded.
+//! Set-up of a machine, without recording.
 
 use super::press::Press;
 use super::run::Calibration;
@@ -10,41 +10,41 @@ use std::collections::VecDeque;
 use std::fmt;
 use std::time::Duration;
 
-/// Longest jog along an axis, in metres.
+/// Longest jog, in metres.
 pub const LONGEST_JOG_M: f64 = 0.01;
 
-/// Places of a plan, each once, for a dry run.
+/// Returns the distinct places of a plan.
 pub fn dry_run(plan: &[Press]) -> Vec<Position> {
     let mut places: Vec<Position> = plan.iter().map(|press| press.position).collect();
     places.dedup();
     places
 }
 
-/// Task of a machine that is set up.
+/// Set-up task.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SetUpTask {
-    /// Travel over these places at the height of travel, and end.
+    /// Travel above these places, then end.
     DryRun(Vec<Position>),
-    /// Move by these distances along x, y and z, never below the height of travel.
+    /// Move in metres, not below the height of travel.
     Jog([f64; 3]),
-    /// Find the height of the touch at the current position.
+    /// Touch-off at the present position.
     TouchOff,
     /// End with the finger lifted.
     End,
 }
 
-/// Outcome of a task, or of a part of it.
+/// Outcome of a set-up task.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SetUpNote {
-    /// A dry run is above a place.
+    /// A dry run is above this place.
     Above(Position),
-    /// A dry run has ended after this number of places.
+    /// Number of places of a finished dry run.
     DryRunEnded(usize),
-    /// A jog ended at this position, in metres of the machine.
+    /// Position after a jog, in machine coordinates.
     At([f64; 3]),
-    /// The finger touches at this height, in metres of the machine.
+    /// Height of the touch, in machine coordinates.
     Touch(f64),
-    /// A touch-off found no height.
+    /// Failed touch-off.
     NoTouch(TouchOffFailure),
 }
 
@@ -73,17 +73,16 @@ impl fmt::Display for SetUpNote {
     }
 }
 
-/// A length in metres, shown in millimetres with three decimals at most.
+/// Length in metres, displayed in mm.
 struct Millimetres(f64);
 
 impl fmt::Display for Millimetres {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // Adding 0 makes -0 a 0.
+        // Turns -0 into 0.
         write!(f, "{}", (self.0 * 1e6).round() / 1e3 + 0.0)
     }
 }
 
-/// Next action of a set-up.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum SetUpAction {
     Wait,
@@ -91,24 +90,13 @@ pub(super) enum SetUpAction {
     Note(SetUpNote),
 }
 
-/// A task under way.
 #[derive(Debug)]
 enum Work {
-    /// The places to come, the place that it travels to, and the number of places that it reached.
-    DryRun {
-        places: VecDeque<Position>,
-        to: Option<Position>,
-        reached: usize,
-    },
-    /// A jog; true once it was ordered.
-    Jog {
-        by_m: [f64; 3],
-        is_ordered: bool,
-    },
+    DryRun { places: VecDeque<Position>, to: Option<Position>, reached: usize },
+    Jog { by_m: [f64; 3], is_ordered: bool },
     TouchOff(TouchOff),
 }
 
-/// Tasks of a machine that is set up.
 #[derive(Debug)]
 pub(super) struct SetUp {
     stage: Stage,
@@ -124,7 +112,7 @@ impl SetUp {
 
     pub fn ask(&mut self, task: SetUpTask) {
         match task {
-            // This ends any task, because the machine lifts its finger when it is finished.
+            // Ends any task, because finish lifts the finger.
             SetUpTask::End => self.has_ended = true,
             task => self.asked.push_back(task),
         }
@@ -134,22 +122,19 @@ impl SetUp {
         self.has_ended
     }
 
-    /// True while no task is under way or asked for.
     pub fn is_idle(&self) -> bool {
         self.work.is_none() && self.asked.is_empty()
     }
 
-    /// True while no task is under way.
     pub fn is_between_tasks(&self) -> bool {
         self.work.is_none()
     }
 
-    /// True while a touch-off lowers the finger according to the readings.
     pub fn needs_readings(&self) -> bool {
         matches!(self.work, Some(Work::TouchOff(_)))
     }
 
-    /// The next action of a machine that rests at a position, in metres of the machine. `waited` is the time since its last move or note.
+    /// Next action of a resting machine; `waited` since its last move or note.
     pub fn next(&mut self, at_m: [f64; 3], waited: Duration, calibration: &mut Calibration) -> SetUpAction {
         let action = match &mut self.work {
             None => return self.begin(calibration),
@@ -173,7 +158,6 @@ impl SetUp {
         };
         let is_over = matches!(&action, SetUpAction::Note(note) if !matches!(note, SetUpNote::Above(_)));
         if is_over {
-            // A dry run ends the set-up, because no user waits for further tasks.
             self.has_ended |= matches!(action, SetUpAction::Note(SetUpNote::DryRunEnded(_)));
             self.work = None;
             calibration.detect_touch(false);
@@ -198,7 +182,6 @@ impl SetUp {
     }
 }
 
-/// Travels over the next place, after the last one was reached.
 fn fly_over(places: &mut VecDeque<Position>, to: &mut Option<Position>, reached: &mut usize) -> SetUpAction {
     if let Some(position) = to.take() {
         *reached += 1;

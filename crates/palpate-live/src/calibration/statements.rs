@@ -1,4 +1,4 @@
-//! Statements of the operator before the first press: placement, weights, and whether the force in use is known.
+//! Statements of the operator.
 
 use super::plan::Weights;
 use palpate_estimators::recording::{Row, is_same_force};
@@ -8,16 +8,16 @@ use palpate_rig::Rig;
 /// Statements of the operator.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Statements {
-    /// Standard deviation of the pressed place about the requested one, in each direction, in metres.
+    /// Standard deviation of the placement, in metres.
     pub placement_sd_m: Option<f64>,
-    /// A second weight, in newtons.
+    /// Second force, in newtons.
     pub second_force_n: Option<f64>,
-    /// True if contacts in use have the force of the presses.
+    /// True if contacts in use have this force.
     pub force_is_known: bool,
 }
 
 impl Statements {
-    /// Checks that the numbers are finite and greater than 0.
+    /// Checks that the numbers are finite and positive.
     ///
     /// # Errors
     /// [`OutOfRange`].
@@ -28,7 +28,7 @@ impl Statements {
         )
     }
 
-    /// The statements, completed from the rig and from a file of presses.
+    /// Adds values from the rig and a file of presses.
     #[must_use]
     pub fn or_known(self, rig: &Rig, force_n: Option<f64>, in_file_m: Option<f64>, before: &[Row]) -> Self {
         let of_rig = rig.training.as_ref().and_then(|training| training.placement_sd_m);
@@ -42,7 +42,7 @@ impl Statements {
         }
     }
 
-    /// The rig according to the statements: with a known force in use, if it is that of the presses.
+    /// Rig with the force of the presses, if stated as known.
     #[must_use]
     pub fn applied_to(&self, rig: &Rig, force_n: Option<f64>) -> Rig {
         let mut rig = rig.clone();
@@ -53,13 +53,13 @@ impl Statements {
         rig
     }
 
-    /// The weights of the presses.
+    /// Weights of the presses.
     pub fn weights(&self, force_n: Option<f64>) -> Weights {
         Weights { force_n, second_n: self.second_force_n.filter(|_| !self.force_is_known) }
     }
 
-    /// The single weight of all presses, in newtons, if one is not enough. This is the case for a surface without a model and an unknown force in
-    /// use: the forces of the presses show how a reading grows with the force.
+    /// Single force of all presses in newtons, if a second is necessary: without a model, an unknown force in
+    /// use requires two.
     pub fn single_weight_n(&self, rig: &Rig, force_n: Option<f64>) -> Option<f64> {
         let has_forces = rig.setup.recording_columns().force.is_some();
         let asks = rig.setup.surface().model().is_none()
@@ -113,7 +113,6 @@ kind = "influence"
         for answered in [
             Statements { second_force_n: Some(4.0), ..stated },
             Statements { force_is_known: true, ..stated },
-            // The file of presses already contains a second weight.
             stated.or_known(&rig, None, None, &[row(0.0), row(2.0), row(4.0)]),
         ] {
             assert_eq!(answered.single_weight_n(&rig, None), None, "{answered:?}");

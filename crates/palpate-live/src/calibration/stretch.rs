@@ -1,26 +1,26 @@
-//! The readings of the last seconds.
+//! Recent readings.
 
 use palpate_estimators::recording::{RepeatCause, RepeatCounts, is_same_reading};
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Span over which readings are tested for rest, and the smallest number of readings: those of a slow board span more.
+/// Span and minimum number of readings at rest.
 pub const REST_SPAN: Duration = Duration::from_millis(400);
 const REST_READINGS: usize = 8;
-/// Span from which the noise is learnt, and the smallest number of readings in it.
+/// Span and minimum number of readings for noise.
 const NOISE_SPAN: Duration = Duration::from_secs(1);
 const NOISE_READINGS: usize = 20;
-/// Longest stored span: it is long enough to show a steady drift.
+/// Longest span, sufficient for a steady drift.
 pub const LONGEST_SPAN: Duration = Duration::from_secs(3);
 
-/// The readings of the last seconds, with their instants.
+/// Recent readings with their instants.
 #[derive(Clone, Debug, Default)]
 pub struct Stretch {
     readings: VecDeque<(Duration, Vec<f64>)>,
 }
 
 impl Stretch {
-    /// Adds a reading, and removes those that are older than [`LONGEST_SPAN`].
+    /// Adds a reading, and removes those older than [`LONGEST_SPAN`].
     pub fn add(&mut self, at: Duration, reading: &[f64]) {
         self.readings.push_back((at, reading.to_vec()));
         while self.readings.len() > NOISE_READINGS
@@ -30,28 +30,23 @@ impl Stretch {
         }
     }
 
-    /// Removes all readings.
     pub fn clear(&mut self) {
         self.readings.clear();
     }
 
-    /// True for a single reading, for example after a move of a machine.
     pub fn has_one_reading(&self) -> bool {
         self.readings.len() == 1
     }
 
-    /// Instant of the last reading.
     pub fn last_at(&self) -> Option<Duration> {
         self.readings.back().map(|(at, _)| *at)
     }
 
-    /// The last reading.
     pub fn last(&self) -> Option<&[f64]> {
         self.readings.back().map(|(_, reading)| reading.as_slice())
     }
 
-    /// The reading in the middle of [`Self::latest`], with its instant; before that span is covered, the one in the middle of the last
-    /// [`REST_SPAN`].
+    /// Middle reading of [`Self::latest`], or of the last [`REST_SPAN`].
     pub fn middle(&self) -> Option<(Duration, &[f64])> {
         let last = self.last_at()?;
         let begin = self.rest_begin().unwrap_or(last.saturating_sub(REST_SPAN));
@@ -60,7 +55,7 @@ impl Stretch {
         self.readings.get(index).map(|(at, reading)| (*at, reading.as_slice()))
     }
 
-    /// The readings of the last [`REST_SPAN`], or the last 8 of a slow board; `None` while there are fewer.
+    /// Readings of the last [`REST_SPAN`], at least 8.
     pub fn latest(&self) -> Option<Vec<&[f64]>> {
         let begin = self.rest_begin()?;
         let mut readings: Vec<&[f64]> = self
@@ -74,15 +69,14 @@ impl Stretch {
         Some(readings)
     }
 
-    /// Begin of the span over which readings are tested for rest, if it is covered.
     fn rest_begin(&self) -> Option<Duration> {
         let few = self.readings.len().checked_sub(REST_READINGS)?;
         let begin = self.last_at()?.checked_sub(REST_SPAN)?.min(self.readings[few].0);
-        // A reading at the begin or before it shows that the span is covered.
+        // An earlier reading shows that the span is covered.
         (self.readings.front()?.0 <= begin).then_some(begin)
     }
 
-    /// True if the source repeats readings because it is faster than its sensors; the readings must be at rest.
+    /// True if a source at rest repeats readings, because its sensors are slower.
     pub fn is_sample_and_hold(&self) -> bool {
         let Some(reading) = self.last() else { return false };
         let mut counts = RepeatCounts::new(reading.len());
@@ -91,12 +85,11 @@ impl Stretch {
         counts.cause() == Some(RepeatCause::SampleAndHold)
     }
 
-    /// True for a reading that repeats the last one.
     pub fn is_repeat(&self, reading: &[f64]) -> bool {
         self.last().is_some_and(|last| is_same_reading(last, reading))
     }
 
-    /// The stretch without readings that repeat their predecessor; `None` if none does.
+    /// Stretch without repetitions, if it has any.
     pub fn without_repeats(&self) -> Option<Self> {
         let pairs = self.readings.iter().zip(self.readings.iter().skip(1));
         if !pairs.into_iter().any(|((_, before), (_, reading))| is_same_reading(before, reading)) {
@@ -111,7 +104,7 @@ impl Stretch {
         Some(distinct)
     }
 
-    /// The readings of at least a second, with seconds before the last one, if they are sufficient to learn the noise.
+    /// Readings with relative times in seconds, if sufficient for the noise.
     pub fn for_noise(&self) -> Option<Vec<(f64, &[f64])>> {
         let end = self.last_at()?;
         let span = end.saturating_sub(self.readings.front()?.0);
@@ -121,7 +114,7 @@ impl Stretch {
         (span >= NOISE_SPAN && readings.len() >= NOISE_READINGS).then_some(readings)
     }
 
-    /// The readings of the last second, and the reading before them, which is older after a pause.
+    /// Readings of the last second, and their predecessor.
     pub fn last_second(&self) -> impl Iterator<Item = &[f64]> {
         let begin = self.last_at().unwrap_or_default().saturating_sub(NOISE_SPAN);
         let later = self.readings.partition_point(|(at, _)| *at <= begin);
@@ -129,7 +122,6 @@ impl Stretch {
     }
 }
 
-/// Mean of readings, channel by channel.
 pub fn mean(readings: &[&[f64]]) -> Vec<f64> {
     let mut mean = vec![0.0; readings.first().map_or(0, |reading| reading.len())];
     for reading in readings {

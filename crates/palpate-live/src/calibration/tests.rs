@@ -1,4 +1,4 @@
-//! A simulated hand calibrates a simulated strip in virtual time, strikes a press out and checks at fresh places.
+//! A simulated hand calibrates and checks a simulated strip in virtual time.
 
 use super::*;
 use crate::input::{Arrival, Arrived};
@@ -20,7 +20,7 @@ struct Hand<'a> {
 }
 
 impl Hand<'_> {
-    /// Follows the requests of the guide until `until` is true for the calibration, or no step is left.
+    /// Follows the requests of the guide until `until` is true, or no step remains.
     fn obey(&mut self, calibration: &mut Calibration, until: impl Fn(&Calibration) -> bool) {
         for _ in 0..20_000 {
             if until(calibration) || calibration.guide().waiting() == Waiting::Nothing {
@@ -65,7 +65,7 @@ fn repeated_readings_count_once_for_the_noise() {
     };
     let measured: Vec<[f64; 3]> =
         (0..100).map(|_| channels.map(|sd| sd * 12_f64.sqrt() * (uniform() - 0.5))).collect();
-    // Means of the same distinct readings at 20 readings a second; each reading is repeated up to 10 times in the same time.
+    // Means of distinct readings at 20 a second, each repeated up to 10 times.
     let sizes = [1, 2, 5, 10].map(|times| {
         let mut guide =
             Guide::new(vec![Press { position: Position::along(0.1), force_n: None, depth_m: None }]);
@@ -89,7 +89,7 @@ fn repeated_readings_count_once_for_the_noise() {
     }
 }
 
-/// A load cell that was not tared stops the machine by the change of its value, both before and after its untouched reading is learnt.
+/// An untared load cell stops the machine by its change.
 #[test]
 fn the_limit_of_a_load_cell_counts_from_its_untouched_reading() {
     let rig = Rig::from_toml(RIG).unwrap();
@@ -154,7 +154,6 @@ fn presses_are_struck_out_redone_fitted_and_checked() {
     assert_eq!(recording.provenance.placement_sd_m, Some(2e-3));
     let locator = rig.estimator.fit_task(FitTask::new(&rig.setup, &recording)).unwrap();
     assert_eq!(locator.provenance.recording.placement_sd_m, Some(2e-3));
-    // Fresh places, in a file of their own.
     let checked = check_path(&path);
     let mut check = begun(&rig, &checked, check_presses(&rig, &recording.rows, Weights::default(), &[]));
     hand.obey(&mut check, |_| false);

@@ -1,7 +1,7 @@
-//! Touch-off: the height at which a machine's finger touches the untouched surface, found by the readings.
+//! Touch-off: height at which the finger touches the surface.
 //!
-//! The finger goes down in steps, and rests after each, until the readings show the touch. A coarse pass from the height of travel finds the step
-//! of the touch. After a lift, which must restore the untouched reading, a fine pass finds the height within that step.
+//! The finger descends in steps with rests: a coarse pass from the height of travel, a lift that must restore
+//! the untouched reading, and a fine pass.
 
 use super::baseline::{Baseline, NOISE_LIMIT_SD};
 use super::guide::ONSET_READINGS;
@@ -9,38 +9,38 @@ use super::stretch::{Stretch, mean};
 use palpate_rig::Stage;
 use std::time::Duration;
 
-/// Number of readings without a touch that shows an untouched surface.
+/// Readings that show an untouched surface.
 const CLEAR_READINGS: usize = 2 * ONSET_READINGS as usize;
-/// Coarse step as a share of the shallowest press, which limits how hard a touch-off presses.
+/// Coarse step relative to the shallowest press, for a light touch.
 const COARSE_SHARE: f64 = 0.1;
-/// Fine step as a share of the coarse step.
+/// Fine step relative to the coarse one.
 const FINE_SHARE: f64 = 0.1;
-/// Smallest step in metres: a firmware reports hundredths of a millimetre.
+/// Smallest step in metres, the resolution of firmwares.
 const LEAST_STEP_M: f64 = 1e-5;
-/// Share of the deviation of a touch that may remain after the lift.
+/// Largest remainder of a touch after the lift.
 const RETURN_SHARE: f64 = 0.5;
-/// Time limit for the untouched reading to come to rest, and to return after a lift.
+/// Time limit for rest, and for the return.
 const SETTLES_WITHIN: Duration = Duration::from_secs(30);
 
-/// Reason why a touch-off found no height.
+/// Cause of a failed touch-off.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum TouchOffFailure {
-    /// The lowest height was reached.
+    /// No touch.
     #[error(
         "no reading shows a touch down to z {:.3} mm, `touch` less the deepest of `depths`: lower `touch` of [stage], or move over the surface",
         lowest_m * 1e3
     )]
     NoTouch {
-        /// The lowest height, in metres of the machine.
+        /// Lowest height, in machine coordinates.
         lowest_m: f64,
     },
-    /// The untouched reading does not come to rest.
+    /// No rest.
     #[error(
         "the untouched readings have not settled within {} s: keep the surface free of other contacts",
         SETTLES_WITHIN.as_secs()
     )]
     NoRest,
-    /// The reading does not return when the finger is lifted.
+    /// No return after the lift.
     #[error(
         "the readings did not return within {} s after the lift: they drift, or something else touches the surface",
         SETTLES_WITHIN.as_secs()
@@ -48,29 +48,23 @@ pub enum TouchOffFailure {
     NoReturn,
 }
 
-/// State of contact according to the readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Contact {
-    /// There are too few readings since the last move.
     Undecided,
     None,
     Touch,
 }
 
-/// Readings of a finger at rest, for comparison with the untouched reading.
 #[derive(Clone, Debug, Default)]
 pub(super) struct TouchDetector {
-    /// Readings since the last move.
     stretch: Stretch,
     baseline: Option<Baseline>,
-    /// Number of readings since the last move, and number of consecutive ones that deviate by more than noise.
     count: usize,
     deviating: u32,
     is_touched: bool,
 }
 
 impl TouchDetector {
-    /// Processes a reading: the load cell's value, or the values of all channels.
     pub fn add(&mut self, at: Duration, reading: &[f64]) {
         self.stretch.add(at, reading);
         self.count += 1;
@@ -84,12 +78,10 @@ impl TouchDetector {
         }
     }
 
-    /// Discards the readings before a move; the baseline is kept.
     pub fn forget_readings(&mut self) {
         *self = Self { baseline: self.baseline.take(), ..Self::default() };
     }
 
-    /// Untouched value of the last channel; `None` before it is learnt.
     pub fn untouched_last(&self) -> Option<f64> {
         self.baseline.as_ref()?.mean.last().copied()
     }
@@ -102,7 +94,7 @@ impl TouchDetector {
         }
     }
 
-    /// Largest deviation of the mean of the readings at rest, in standard deviations of the noise; `None` while there are too few readings.
+    /// Largest mean deviation at rest, in standard deviations.
     fn size(&self) -> Option<f64> {
         let readings: Vec<&[f64]> = self.stretch.last_second().collect();
         let baseline = self.baseline.as_ref().filter(|_| readings.len() >= CLEAR_READINGS)?;
@@ -110,50 +102,41 @@ impl TouchDetector {
     }
 }
 
-/// Next action of a touch-off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum TouchOffAction {
-    /// More readings are needed.
     Wait,
-    /// The finger goes down to this height, in metres of the machine.
+    /// Descent to a machine z in metres.
     Lower(f64),
-    /// The finger is lifted to the height of travel.
     Lift,
-    /// The finger is lifted, and the touch is at this height.
     Found(f64),
-    /// The finger is lifted.
     Failed(TouchOffFailure),
 }
 
-/// Step of a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Step {
-    /// The untouched reading is learnt, with the finger lifted.
     Learn,
-    /// The finger rests at a height.
-    Down { z_m: f64 },
-    /// The finger was lifted after a touch of this deviation.
-    Return { size: f64 },
-    /// The finger is lifted, and no height was found.
+    Down {
+        z_m: f64,
+    },
+    /// Lift after this deviation.
+    Return {
+        size: f64,
+    },
     Failed(TouchOffFailure),
 }
 
-/// A search for the height of the touch.
 #[derive(Clone, Debug)]
 pub(super) struct TouchOff {
     step: Step,
-    /// Heights of the present pass, in metres of the machine: the first, the lowest, and the distance between two.
+    /// Top, bottom and step of the pass, in machine coordinates.
     top_m: f64,
     lowest_m: f64,
     step_m: f64,
-    /// Height of the touch in the coarse pass.
     coarse_m: Option<f64>,
-    /// Height of the touch in the fine pass.
     found_m: Option<f64>,
 }
 
 impl TouchOff {
-    /// A search at the machine's present position, from the height of travel to the deepest press.
     pub fn new(stage: &Stage) -> Self {
         let shallowest_m = stage.depths_m.iter().copied().fold(f64::INFINITY, f64::min);
         let step_m = (COARSE_SHARE * shallowest_m).max(LEAST_STEP_M);
@@ -167,7 +150,7 @@ impl TouchOff {
         }
     }
 
-    /// The action that follows from the readings since the last action. `waited` is the time since then.
+    /// Next action; `waited` since the last one.
     pub fn next(&mut self, waited: Duration, detector: &mut TouchDetector) -> TouchOffAction {
         match self.step {
             Step::Learn => self.learn(waited, detector),
@@ -210,7 +193,6 @@ impl TouchOff {
         }
     }
 
-    /// Checks that the reading returns after the lift; otherwise it was not a touch.
     fn check_return(&mut self, size: f64, waited: Duration, detector: &mut TouchDetector) -> TouchOffAction {
         match detector.size() {
             Some(now) if now < RETURN_SHARE * size => {}
@@ -220,7 +202,7 @@ impl TouchOff {
         if let Some(found_m) = self.found_m {
             return TouchOffAction::Found(found_m);
         }
-        // One coarse step higher, the surface was untouched.
+        // The touch is within the last coarse step.
         let coarse_m = self.coarse_m.unwrap_or(self.top_m);
         (self.top_m, self.lowest_m) = (coarse_m + self.step_m, (coarse_m - self.step_m).max(self.lowest_m));
         self.step_m = (FINE_SHARE * self.step_m).max(LEAST_STEP_M);
@@ -238,10 +220,8 @@ mod tests {
     use rand_xoshiro::Xoshiro256PlusPlus;
 
     const TOUCH_M: f64 = 0.0217;
-    /// Time between two readings.
     const EVERY: Duration = Duration::from_millis(10);
 
-    /// A stage with a `touch` that is 0.3 mm too high, so that it is above the surface.
     fn stage() -> Stage {
         Stage {
             origin_m: (0.0, 0.0),
@@ -256,7 +236,7 @@ mod tests {
         }
     }
 
-    /// Outcome of a search over a surface with a reading that depends on the finger's height and the time; with the lowest height and the time.
+    /// Outcome, lowest height and duration of a search.
     fn search(
         setup: &Stage,
         read: impl Fn(f64, f64) -> Vec<f64>,
@@ -286,7 +266,7 @@ mod tests {
         }
     }
 
-    /// 3,000 counts a millimetre, for two channels with an offset and a noise of 1 count.
+    /// 3,000 counts a millimetre, noise of 1 count.
     fn counts(z_m: f64) -> Vec<f64> {
         let depth_mm = (TOUCH_M - z_m).max(0.0) * 1e3;
         vec![500.0 + 3000.0 * depth_mm, -80.0 - 900.0 * depth_mm]
@@ -296,7 +276,7 @@ mod tests {
     fn finds_the_touch_by_the_channels_within_a_fine_step() {
         let (found, lowest_m, time) = search(&stage(), |z_m, _| counts(z_m));
         let found_m = found.unwrap();
-        // A fine step is 0.01 mm.
+        // Fine step 0.01 mm.
         assert!((-1.5e-5..=1e-9).contains(&(found_m - TOUCH_M)), "{found_m}");
         assert!(TOUCH_M - lowest_m <= 1.001e-4, "it presses no deeper than a coarse step: {lowest_m}");
         assert!(time < Duration::from_secs(20), "{time:?}");
@@ -304,7 +284,7 @@ mod tests {
 
     #[test]
     fn a_weak_reading_is_found_where_it_exceeds_the_noise() {
-        // 20 counts a millimetre: the touch becomes detectable 0.4 mm below the surface.
+        // 20 counts a millimetre: detectable 0.4 mm below the surface.
         let weak = |z_m: f64, _| vec![20.0 * (TOUCH_M - z_m).max(0.0) * 1e3];
         let found_m = search(&stage(), weak).0.unwrap();
         assert!((3e-4..6e-4).contains(&(TOUCH_M - found_m)), "{found_m}");
@@ -319,7 +299,7 @@ mod tests {
 
     #[test]
     fn drift_is_no_touch() {
-        // 5 counts a second: 8 standard deviations of the noise in less than 2 s.
+        // 5 counts a second: 8 standard deviations in less than 2 s.
         let (found, ..) = search(&stage(), |_, time_s| vec![500.0 + 5.0 * time_s]);
         assert_eq!(found, Err(TouchOffFailure::NoReturn));
     }

@@ -1,25 +1,23 @@
-//! Traces of presses: the course of their readings until they were recorded.
+//! Traces of presses.
 
 use super::repeats::distance;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Time that a trace shows before a press is recorded.
 const SHOWN: Duration = Duration::from_secs(4);
-/// Largest number of stored readings, and largest number of points of a trace.
+/// Limits on readings, and on points.
 const MOST_READINGS: usize = 8192;
 const MOST_POINTS: usize = 120;
-/// Seconds that a trace shows before the untouched reading: half of the shortest time for which the surface is then at rest.
+/// Half the shortest rest before an untouched reading.
 const BEFORE_S: f64 = 0.2;
 
-/// Course of the size of a press until it was recorded.
+/// Size of a press over time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
-    /// Seconds relative to the recording, at most 0, and the distance from the untouched reading in % of that of the row.
+    /// Seconds relative to the recording (≤ 0), and relative distance from the untouched reading in %.
     pub points: Vec<(f64, f64)>,
 }
 
-/// Readings of the last seconds.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RecentReadings {
     readings: VecDeque<(Duration, Vec<f64>)>,
@@ -34,14 +32,14 @@ impl RecentReadings {
         }
     }
 
-    /// Trace of a press that is recorded now with the last of the readings; the untouched reading was recorded `ago_s` seconds earlier.
+    /// Trace of the press with the last reading, `ago_s` after its untouched one.
     pub fn trace(&self, untouched: &[f64], ago_s: f64) -> Trace {
         let Some((taken, pressed)) = self.readings.back() else { return Trace::default() };
         let size = distance(pressed, untouched);
         let age_s = |at: Duration| taken.saturating_sub(at).as_secs_f64();
         let shown = self.readings.iter().rev().take_while(|(at, _)| age_s(*at) <= ago_s + BEFORE_S);
         let every = shown.clone().count().div_ceil(MOST_POINTS).max(1);
-        // From the last reading backwards, so that the recorded reading is among the points.
+        // Backwards, so that the recorded reading is a point.
         let points = shown.step_by(every).map(|(at, reading)| {
             let percent = if size > 0.0 { 100.0 * distance(reading, untouched) / size } else { 0.0 };
             (-age_s(*at), percent)
@@ -68,7 +66,7 @@ mod tests {
         assert_eq!(points.last(), Some(&(0.0, 100.0)));
         assert!(points[0].0 >= -SHOWN.as_secs_f64() && points[0].0 < -3.9, "{:?}", points[0]);
         assert!(points.windows(2).all(|pair| pair[0].0 < pair[1].0 && pair[0].1 <= pair[1].1));
-        // Readings before the untouched one belong to another press.
+        // Earlier readings belong to another press.
         let points = recent.trace(&[7.0], 1.0).points;
         assert!(points[0].0 >= -1.0 - BEFORE_S && points.len() > 50, "{points:?}");
     }

@@ -1,33 +1,30 @@
-//! Binary frames: 32-bit values with a number, a time and a checksum. The bytes are stuffed, and a zero byte ends each frame.
+//! Binary frames with COBS stuffing, ended by a zero; little-endian.
 //!
 //! | bytes | content |
 //! |---|---|
 //! | 1 | type, 1 |
-//! | 4 | number of the frame, wraps around |
+//! | 4 | sequence number, wraps around |
 //! | 4 | time by the board's clock in µs, wraps around |
 //! | 1 | number `n` of values |
 //! | 4 n | values, IEEE 754 single precision |
-//! | 2 | CRC-16/CCITT-FALSE of all bytes before |
+//! | 2 | CRC-16/CCITT-FALSE of the preceding bytes |
 //!
-//! All numbers are little-endian. The bytes are stuffed by COBS (Cheshire, Baker, "Consistent Overhead Byte Stuffing", IEEE/ACM Transactions on
-//! Networking 7, 1999), and a zero follows. COBS is implemented here: the crate `cobs` adds five dependencies for these two functions.
+//! COBS: Cheshire, Baker, "Consistent Overhead Byte Stuffing", IEEE/ACM Transactions on Networking 7, 1999.
+//! The crate `cobs` would add five dependencies.
 
 use super::names::{Filling, Names, Role};
 use super::{BadFrame, Frame};
 use crc::{CRC_16_IBM_3740, Crc};
 use std::time::Duration;
 
-/// CRC-16/CCITT-FALSE, also named IBM 3740.
 const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
-/// Type of a frame of values.
 const VALUES: u8 = 1;
-/// Bytes before and after the values.
 const HEAD: usize = 10;
 const TAIL: usize = 2;
-/// Most bytes of a stuffed frame, without the zero: 255 values, and one additional byte per 254.
+/// Most bytes without the zero: 255 values, one more byte per 254.
 pub const LONGEST: usize = HEAD + 4 * 255 + TAIL + 5;
 
-/// Appends the binary frame of up to 255 values to `bytes`; further values are omitted.
+/// Appends a frame; values beyond 255 are omitted.
 pub fn encode_into(bytes: &mut Vec<u8>, sequence: u32, time_us: u32, values: &[f32]) {
     let values = &values[..values.len().min(255)];
     let mut frame = Vec::with_capacity(HEAD + 4 * values.len() + TAIL);
@@ -42,7 +39,7 @@ pub fn encode_into(bytes: &mut Vec<u8>, sequence: u32, time_us: u32, values: &[f
     bytes.push(0);
 }
 
-/// Decodes a stuffed frame without its zero; the roles of its values are those of `columns`.
+/// Decodes a stuffed frame without its zero.
 pub fn decode(
     stuffed: &[u8],
     names: &Names,
@@ -72,7 +69,6 @@ pub fn decode(
     filling.finish()
 }
 
-/// Appends bytes stuffed: each block of up to 254 bytes without a zero follows its length plus 1.
 fn stuff(bytes: &[u8], to: &mut Vec<u8>) {
     let mut rest = bytes;
     loop {
@@ -90,7 +86,6 @@ fn stuff(bytes: &[u8], to: &mut Vec<u8>) {
     }
 }
 
-/// Writes the unstuffed bytes into `to`; `None` for invalid stuffing.
 fn unstuff(stuffed: &[u8], to: &mut Vec<u8>) -> Option<()> {
     to.clear();
     let mut rest = stuffed;

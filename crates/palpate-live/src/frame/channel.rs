@@ -9,14 +9,14 @@ use palpate_mechanics::units::Unit;
 pub struct Channel {
     /// Name of the sensor.
     pub name: String,
-    /// Name in the frames of a board: the column of the locator's calibration recordings, if it has a name.
+    /// Name in frames: that of the column in the calibration recordings, else of the sensor.
     pub label: String,
-    /// Unit of the numbers of the board, which is that of the recordings.
+    /// Unit in frames and recordings.
     pub unit: Unit,
 }
 
 impl Channel {
-    /// Channels of the boards of a setup, in the order of its sensors.
+    /// Returns the channels of a setup in order.
     pub fn all_of(setup: &Setup) -> Vec<Self> {
         let columns = setup.recording_columns().channels;
         let sensors = setup.layout().sensors().iter();

@@ -1,42 +1,35 @@
-//! Frames of a stream or of messages, text or binary.
+//! Decoder of frames, text or binary.
 
 use super::binary;
 use super::names::{Names, Role};
 use super::text::{Line, TextReader, is_text};
 use super::{BadFrame, Channel, Frame, quote};
 
-/// Most bytes of a line.
 const LONGEST_LINE: usize = 1 << 16;
 /// Most bytes of a message.
 pub const LONGEST_MESSAGE: usize = 1 << 17;
-/// Bytes of a frame that are kept for a quotation: at most 80 characters of up to four bytes each.
+/// Quotation of 80 characters of four bytes.
 const QUOTED: usize = 320;
 
-/// Decoder of the frames of a source: text or binary, whichever it sends.
-///
-/// A stream is text once a line is a frame or a header, and binary once the bytes between two zeros are a frame with its checksum. The decision does
-/// not depend on how the bytes are split into arrivals.
+/// Decoder that detects text (a valid line) or binary frames (a valid checksum).
 #[derive(Debug)]
 pub struct Decoder {
     text: TextReader,
     form: Form,
-    /// Bytes since the last line end (text), the last zero (binary), or the last decided byte (unknown).
+    /// Bytes since the last frame end, or the last decided byte.
     held: Vec<u8>,
-    /// Unknown form: start of the last line in `held`.
+    /// Start of the last line in `held`, for an unknown form.
     line_start: usize,
-    /// Unknown form: lines in `held` that are not text.
     not_text: u64,
-    /// The start of the present line, or binary frame, is missing.
+    /// The start of line or frame is missing.
     torn_line: bool,
     torn_binary: bool,
-    /// Bytes are skipped up to the end of a frame that is too long.
+    /// Skips a frame that is too long.
     skips: bool,
-    /// Start of the last bad frame; empty before the first one.
     last_bad: Vec<u8>,
     scratch: Vec<u8>,
 }
 
-/// Form of a stream's frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Form {
     Unknown,
@@ -52,15 +45,15 @@ pub enum ColumnsError {
         "the columns {columns} have no channel `{channel}`; name every channel, and anything else that a line has"
     )]
     Missing {
-        /// The columns.
+        /// Columns.
         columns: String,
-        /// The channel.
+        /// Channel.
         channel: String,
     },
-    /// Two columns of one channel.
+    /// A channel with two columns.
     #[error("the columns {columns} have a channel twice; there are {channels} channels")]
     Twice {
-        /// The columns.
+        /// Columns.
         columns: String,
         /// Number of channels.
         channels: usize,
@@ -68,7 +61,7 @@ pub enum ColumnsError {
 }
 
 impl Decoder {
-    /// A decoder of frames of these channels, at the start of a stream.
+    /// Creates a decoder at the start of a stream.
     pub fn new(channels: &[Channel]) -> Self {
         Self {
             text: TextReader::new(Names::new(channels)),
@@ -84,8 +77,7 @@ impl Decoder {
         }
     }
 
-    /// Names the values of frames without names: channels, time, number of the frame, and others, which are ignored. With an empty list the values stay
-    /// the channels in their order.
+    /// Names the values of frames without names; an empty list keeps the order.
     ///
     /// # Errors
     /// [`ColumnsError`] unless every channel is named once.
@@ -106,7 +98,7 @@ impl Decoder {
         Ok(())
     }
 
-    /// Begins a stream. Names from a header are kept, because a board that was only unplugged from the host does not repeat its header.
+    /// Begins a stream. Header names are kept: a board that was only unplugged does not repeat them.
     pub fn open(&mut self) {
         self.form = Form::Unknown;
         self.text.open();
@@ -114,13 +106,13 @@ impl Decoder {
         (self.torn_line, self.torn_binary, self.skips) = (false, false, false);
     }
 
-    /// Begins a stream amid its frames: bytes before the first end of a frame are skipped, unless they are certainly a whole frame.
+    /// Begins a stream amid a frame, which is skipped unless it is certainly whole.
     pub fn join(&mut self) {
         self.open();
         (self.torn_line, self.torn_binary) = (true, true);
     }
 
-    /// Takes the next bytes of a stream, and hands on the completed frames.
+    /// Decodes bytes of a stream.
     pub fn receive(&mut self, mut bytes: &[u8], mut hand_on: impl FnMut(Result<Frame, BadFrame>)) {
         while !bytes.is_empty() {
             let taken = if self.skips {
@@ -136,27 +128,27 @@ impl Decoder {
         }
     }
 
-    /// Takes bytes that waited before the stream was opened. Their readings are old; only names in a header are used.
+    /// Decodes headers in outdated bytes.
     pub fn receive_waiting(&mut self, bytes: &[u8]) {
         self.receive(bytes, |_| {});
         if !self.held.is_empty() {
-            // The incomplete frame is old, too. A binary frame can contain a line end.
+            // The incomplete frame is outdated, too. A binary frame can contain a line end.
             self.clear();
             (self.skips, self.torn_binary) = (true, true);
         }
     }
 
-    /// Quotation of the last bad frame, for messages; `None` before the first one.
+    /// A quotation of the last bad frame.
     pub fn last_bad(&self) -> Option<String> {
         (!self.last_bad.is_empty()).then(|| quote(&self.last_bad))
     }
 
-    /// Bytes since the end of the last frame.
+    /// Bytes of the unfinished frame.
     pub fn unfinished(&self) -> &[u8] {
         &self.held
     }
 
-    /// Takes a message: whole lines of text, or whole binary frames.
+    /// Decodes a message of whole lines or binary frames.
     pub fn receive_message(&mut self, bytes: &[u8], mut hand_on: impl FnMut(Result<Frame, BadFrame>)) {
         if bytes.len() > LONGEST_MESSAGE {
             self.keep_bad(bytes);
@@ -170,7 +162,7 @@ impl Decoder {
         }
     }
 
-    /// Ends a stream: its remaining bytes are a frame.
+    /// Ends a stream with its last frame.
     pub fn end(&mut self, mut hand_on: impl FnMut(Result<Frame, BadFrame>)) {
         let held = std::mem::take(&mut self.held);
         if !held.is_empty() && !self.skips {
@@ -191,15 +183,13 @@ impl Decoder {
         (self.line_start, self.not_text) = (0, 0);
     }
 
-    /// Skips bytes up to the end of a frame.
     fn skip(&mut self, bytes: &[u8]) -> usize {
         let end = bytes.iter().position(|byte| is_line_end(byte) || *byte == 0);
         self.skips = end.is_none();
         end.map_or(bytes.len(), |end| end + 1)
     }
 
-    /// Appends bytes up to the next end to `held`. Returns the number of bytes taken, and whether the end was reached. Hands on
-    /// [`BadFrame::TooLong`] for more than `longest` bytes.
+    /// Returns the number of bytes, and whether the end was reached.
     fn hold(
         &mut self,
         bytes: &[u8],
@@ -242,7 +232,7 @@ impl Decoder {
             let line = std::mem::take(&mut self.held);
             self.end_line(&line, bytes[taken - 1], hand_on);
             if self.held.is_empty() {
-                // The allocation is kept for the next line.
+                // Reuses the allocation for the next line.
                 self.held = line;
                 self.held.clear();
             }
@@ -250,7 +240,7 @@ impl Decoder {
         taken
     }
 
-    /// Reads a line of a text stream. A line with zeros may consist of binary frames, with a line end within the last of them.
+    /// A line with zeros may be binary frames, the last with a line end within.
     fn end_line(&mut self, line: &[u8], end: u8, hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
         let Some(last) = line.iter().rposition(|byte| *byte == 0) else {
             return self.read_line(line, hand_on);
@@ -293,7 +283,6 @@ impl Decoder {
         taken
     }
 
-    /// Decides on the bytes before a zero.
     fn judge_binary(&mut self, hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
         let held = std::mem::take(&mut self.held);
         self.clear();
@@ -315,7 +304,7 @@ impl Decoder {
         }
     }
 
-    /// Decides on the bytes before a line end. The line end may also be a byte of a binary frame.
+    /// The line end may be a byte of a binary frame.
     fn judge_line(&mut self, end: u8, hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
         let mut held = std::mem::take(&mut self.held);
         let torn = std::mem::take(&mut self.torn_line);
@@ -354,7 +343,6 @@ impl Decoder {
         }
     }
 
-    /// Sets the form to text, and reports the earlier lines that are not text.
     fn begin_text(&mut self, hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
         (0..self.not_text).for_each(|_| hand_on(Err(BadFrame::Encoding)));
         self.clear();
@@ -395,7 +383,6 @@ impl Decoder {
     }
 }
 
-/// Index of the first line end. Bytes are compared in groups of sixteen, which compilers do in one instruction.
 fn find_line_end(bytes: &[u8]) -> Option<usize> {
     let (chunks, rest) = bytes.as_chunks::<16>();
     let has_end = |chunk: &[u8; 16]| chunk.iter().fold(false, |found, byte| found | is_line_end(byte));
@@ -405,7 +392,6 @@ fn find_line_end(bytes: &[u8]) -> Option<usize> {
     }
 }
 
-/// True for a byte that ends a line: LF or CR. CR may be followed by LF.
 fn is_line_end(byte: &u8) -> bool {
     matches!(byte, b'\n' | b'\r')
 }
@@ -441,7 +427,7 @@ mod tests {
             received(&mut decoder(), b"1,2\r\n\r\n3,x\n5,6\n7,"),
             [Ok(vec![1.0, 2.0]), Err(BadFrame::NotANumber), Ok(vec![5.0, 6.0])]
         );
-        // The bytes of frame numbers up to 300 include line ends.
+        // The bytes of sequence numbers up to 300 include line ends.
         let verdicts = received(&mut decoder(), &binary(0..300));
         let expected: Vec<Verdict> = (0..300_u16).map(|n| Ok(vec![f64::from(n), 10.0])).collect();
         assert_eq!(verdicts, expected);

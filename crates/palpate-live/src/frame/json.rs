@@ -5,14 +5,12 @@ use super::{BadFrame, Frame};
 use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 
-/// Reads an array of values with the roles `columns`.
 pub fn array(line: &[u8], names: &Names, columns: &[Role]) -> Result<Frame, BadFrame> {
     let mut frame = Filling::new(names);
     verdict(line, |json| json.deserialize_seq(Values { frame: &mut frame, columns }))?;
     frame.finish()
 }
 
-/// Reads an object; `role` gives the role of the `i`-th value by its name.
 pub fn object(line: &[u8], names: &Names, role: impl FnMut(usize, &[u8]) -> Role) -> Result<Frame, BadFrame> {
     let mut frame = Filling::new(names);
     verdict(line, |json| json.deserialize_map(Members { frame: &mut frame, role }))?;
@@ -21,7 +19,6 @@ pub fn object(line: &[u8], names: &Names, role: impl FnMut(usize, &[u8]) -> Role
 
 type Json<'de> = serde_json::Deserializer<serde_json::de::SliceRead<'de>>;
 
-/// Outcome of reading the values of a line. Bytes that are not JSON, or more than one JSON value, are malformed.
 fn verdict<'de>(
     line: &'de [u8],
     read: impl FnOnce(&mut Json<'de>) -> serde_json::Result<Result<(), BadFrame>>,
@@ -32,7 +29,6 @@ fn verdict<'de>(
     verdict
 }
 
-/// Reader of the values of an array.
 struct Values<'a, 'f> {
     frame: &'a mut Filling<'f>,
     columns: &'a [Role],
@@ -60,7 +56,6 @@ impl<'de> Visitor<'de> for Values<'_, '_> {
     }
 }
 
-/// Reader of the members of an object.
 struct Members<'a, 'f, R> {
     frame: &'a mut Filling<'f>,
     role: R,
@@ -84,7 +79,6 @@ impl<'de, R: FnMut(usize, &[u8]) -> Role> Visitor<'de> for Members<'_, '_, R> {
     }
 }
 
-/// Reader of the name of the `i`-th member.
 struct Name<'a, R> {
     i: usize,
     role: &'a mut R,
@@ -110,7 +104,6 @@ impl<R: FnMut(usize, &[u8]) -> Role> Visitor<'_> for Name<'_, R> {
     }
 }
 
-/// Reader that sets a value by its role: a number, in quotes or not, or a time in quotes. Any other value is not a number.
 struct Value<'a, 'f> {
     frame: &'a mut Filling<'f>,
     role: Role,

@@ -19,36 +19,36 @@ pub use reader::FrameReader;
 
 use std::time::Duration;
 
-/// A frame that has been decoded.
+/// A decoded frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// One finite value per channel, in SI units or raw.
     pub reading: Vec<f64>,
-    /// Number of the frame, if the board counts its frames; it may wrap around.
+    /// Sequence number, which may wrap around.
     pub sequence: Option<u32>,
-    /// Time by the clock of the board, if the frame contains it.
+    /// Time by the clock of the board.
     pub device_time: Option<Duration>,
 }
 
-/// Cause of a bad frame: why it is not a reading.
+/// Cause of a bad frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BadFrame {
-    /// More bytes than a frame can have, without an end.
+    /// Too many bytes without an end.
     TooLong,
-    /// Another number of values than channels.
+    /// A wrong number of values.
     Channels,
-    /// A channel that is missing among the names.
+    /// A missing channel.
     MissingChannel,
-    /// A value that is not a finite number.
+    /// A value that is not finite.
     NotANumber,
-    /// A value in another unit than the channel's.
+    /// A wrong unit.
     OtherUnit,
-    /// Bytes that are neither text nor a binary frame.
+    /// Neither text nor a binary frame.
     Encoding,
-    /// A checksum that does not match the bytes.
+    /// A wrong checksum.
     Checksum,
-    /// A binary frame with an invalid length or type, or invalid JSON.
+    /// Invalid length, type or JSON.
     Malformed,
 }
 
@@ -65,7 +65,7 @@ impl BadFrame {
         Self::Malformed,
     ];
 
-    /// Description in words.
+    /// Description.
     pub const fn describe(self) -> &'static str {
         match self {
             Self::TooLong => "longer than any frame",
@@ -79,7 +79,7 @@ impl BadFrame {
         }
     }
 
-    /// Change to a board with channels of these labels, or to its URL, that makes its frames readings.
+    /// Returns the remedy for channels with these labels.
     pub fn remedy<'a>(self, labels: impl IntoIterator<Item = &'a str>) -> String {
         let labels: Vec<&str> = labels.into_iter().collect();
         let labels = labels.join("`, `");
@@ -108,7 +108,7 @@ mod tests {
     use super::Channel;
     use palpate_mechanics::units::Unit;
 
-    /// Raw channels of these labels, of sensors s1, s2, …
+    /// Raw channels with these labels, of sensors s1, s2, …
     pub fn channels(labels: &[&str]) -> Vec<Channel> {
         let channel = |(i, label): (usize, &&str)| Channel {
             name: format!("s{}", i + 1),

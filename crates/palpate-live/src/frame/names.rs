@@ -1,22 +1,19 @@
-//! Names of the values of a frame, and a builder of frames from named values.
+//! Names and roles of the values of a frame.
 
 use super::{BadFrame, Channel, Frame, printed};
 use std::time::Duration;
 
-/// Role of a value of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Role {
-    /// The value of a channel, by its index.
+    /// Index of a channel.
     Channel(usize),
-    /// The time by the clock of the board; the number is its unit in seconds.
+    /// Time with its unit in seconds.
     Time(f64),
-    /// The number of the frame.
     Sequence,
-    /// An unknown name; its value is ignored.
     Ignored,
 }
 
-/// Names of the time, with its unit in seconds.
+/// Names of the time, with units in seconds.
 const TIMES: [(&str, f64); 8] = [
     ("t", 1.0),
     ("time", 1.0),
@@ -27,12 +24,10 @@ const TIMES: [(&str, f64); 8] = [
     ("us", 1e-6),
     ("micros", 1e-6),
 ];
-/// Names of the number of the frame.
 const SEQUENCES: [&str; 3] = ["n", "seq", "sequence"];
-/// Longest time by the clock of a board, in seconds: about 30,000 years.
+/// About 30,000 years.
 const LONGEST_S: f64 = 1e12;
 
-/// Names of channels, and factors of their units.
 #[derive(Debug)]
 pub struct Names {
     channels: Vec<Channel>,
@@ -40,23 +35,20 @@ pub struct Names {
 }
 
 impl Names {
-    /// Names of these channels.
     pub fn new(channels: &[Channel]) -> Self {
         let factors = channels.iter().map(|channel| channel.unit.factor()).collect();
         Self { channels: channels.to_vec(), factors }
     }
 
-    /// Number of channels.
     pub fn len(&self) -> usize {
         self.channels.len()
     }
 
-    /// A channel.
     pub fn channel(&self, i: usize) -> &Channel {
         &self.channels[i]
     }
 
-    /// Role of a name: a channel by label, else by the name of its sensor, else time or number of the frame. The case of ASCII letters is ignored.
+    /// Channel by label, else by sensor, else time or sequence number; case-insensitive.
     pub fn role(&self, name: &str) -> Role {
         let is = |known: &str| known.eq_ignore_ascii_case(name);
         let channels = || self.channels.iter();
@@ -74,19 +66,17 @@ impl Names {
         }
     }
 
-    /// The first channel that is missing among these roles.
     pub fn lacking(&self, roles: &[Role]) -> Option<&Channel> {
         let lacks = |i: &usize| !roles.contains(&Role::Channel(*i));
         (0..self.len()).find(lacks).map(|i| &self.channels[i])
     }
 }
 
-/// True for a name of the time or of the number of a frame.
 pub fn is_reserved(name: &str) -> bool {
     Names::new(&[]).role(name) != Role::Ignored
 }
 
-/// A frame under construction, value by value.
+/// Builder of a frame.
 pub struct Filling<'a> {
     factors: &'a [f64],
     frame: Frame,
@@ -94,14 +84,12 @@ pub struct Filling<'a> {
 }
 
 impl<'a> Filling<'a> {
-    /// A frame without values.
     pub fn new(names: &'a Names) -> Self {
         let reading = vec![f64::NAN; names.len()];
         let frame = Frame { reading, sequence: None, device_time: None };
         Self { factors: &names.factors, frame, missing: names.len() }
     }
 
-    /// Sets a value by its role.
     pub fn set(&mut self, role: Role, value: f64) -> Result<(), BadFrame> {
         match role {
             Role::Channel(i) => {
@@ -134,7 +122,7 @@ impl<'a> Filling<'a> {
         Ok(())
     }
 
-    /// Sets the time from a date with a time of day, or a time of day alone; false for any other text. A time without milliseconds is ignored.
+    /// Sets the time from text, but ignores a time without milliseconds; false for other text.
     pub fn set_time_text(&mut self, text: &[u8]) -> bool {
         let Ok(text) = std::str::from_utf8(text) else { return false };
         let text = text.trim_matches('"');
@@ -145,13 +133,11 @@ impl<'a> Filling<'a> {
         time_s.is_some() || printed::is_time(text)
     }
 
-    /// Sets the number and the time of a binary frame.
     pub fn set_header(&mut self, sequence: u32, device_time: Duration) {
         self.frame.sequence = Some(sequence);
         self.frame.device_time = Some(device_time);
     }
 
-    /// The frame, once every channel has its value.
     pub fn finish(self) -> Result<Frame, BadFrame> {
         if self.missing == 0 { Ok(self.frame) } else { Err(BadFrame::MissingChannel) }
     }

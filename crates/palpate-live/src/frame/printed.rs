@@ -1,22 +1,17 @@
-//! Lines that programs print for people, with log prefixes, and names and units beside the values.
-//!
-//! Such a line is a list of items `[name :] value [unit]`. A line with text that is neither a name nor a unit is rejected, because its meaning is
-//! ambiguous.
+//! Lines printed for people: items `[name :] value [unit]` after log prefixes. Other text is ambiguous, and
+//! rejected.
 
 use std::borrow::Cow;
 
-/// Value of a line, as text, with its name and its unit; a missing name or unit is empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Item<'a> {
-    /// Name, which may contain blanks.
+    /// May contain blanks.
     pub name: &'a str,
-    /// Number.
     pub value: &'a str,
-    /// Symbol of the unit.
     pub unit: &'a str,
 }
 
-/// The line without the terminal escape sequences (`ESC [ … letter`) of coloured logs.
+/// Removes terminal escape sequences (`ESC [ … letter`).
 pub fn without_colours(line: &[u8]) -> Cow<'_, [u8]> {
     const ESCAPE: u8 = 0x1B;
     if !line.contains(&ESCAPE) {
@@ -33,10 +28,10 @@ pub fn without_colours(line: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(plain)
 }
 
-/// Text after the first log prefix of a line, or within brackets around the whole line; `None` without either.
+/// Removes the first log prefix, or brackets around the line.
 ///
-/// Prefixes are a date or a time of day (`10:11:12.345 -> `), groups in brackets (`[INFO]`), the level, clock and tag of ESP-IDF (`I (1234) tag: `),
-/// a level (`INFO: `), the name of a function (`loop(): `), and `>`. A line that reports a warning or an error keeps its prefix: it is not a reading.
+/// Prefixes: time (`10:11:12.345 -> `), groups (`[INFO]`), ESP-IDF (`I (1234) tag: `), level (`INFO: `),
+/// function (`loop(): `), `>`. Warnings and errors are not readings.
 pub fn message(line: &str) -> Option<&str> {
     strip_time(line)
         .or_else(|| strip_group(line))
@@ -49,27 +44,24 @@ pub fn message(line: &str) -> Option<&str> {
         .filter(|message| !message.is_empty())
 }
 
-/// The line with a `T` in place of the blank between its initial date and time of day, which makes them one field.
+/// Joins date and time of day with a `T`.
 pub fn with_joined_time(line: &str) -> Option<String> {
     let is_apart = time_length(line)? > 10 && line.as_bytes()[10] == b' ';
     is_apart.then(|| format!("{}T{}", &line[..10], &line[11..]))
 }
 
-/// Log levels with messages that may be readings.
 const LEVELS: [&str; 6] = ["trace", "debug", "verbose", "info", "notice", "log"];
 
 fn is_level(word: &str) -> bool {
     LEVELS.iter().any(|level| level.eq_ignore_ascii_case(word))
 }
 
-/// True for a text with a word that indicates a warning or an error.
 fn is_alarm(text: &str) -> bool {
     let words = text.split(|letter: char| !letter.is_ascii_alphabetic());
     let alarms = ["e", "w", "f", "warn", "warning", "err", "error", "fatal", "critical", "panic"];
     words.into_iter().any(|word| alarms.iter().any(|alarm| alarm.eq_ignore_ascii_case(word)))
 }
 
-/// Text after a date, a time of day, or both at the start of a line.
 fn strip_time(line: &str) -> Option<&str> {
     let length = time_length(line)?;
     let rest = line[length..].trim_start();
@@ -77,7 +69,6 @@ fn strip_time(line: &str) -> Option<&str> {
     Some(rest.strip_prefix([',', ';', '|', ':']).unwrap_or(rest))
 }
 
-/// Length of the initial date, time of day, or both of a text. A time of day includes its seconds.
 fn time_length(text: &str) -> Option<usize> {
     let bytes = text.as_bytes();
     // `d` stands for a digit.
@@ -137,13 +128,12 @@ fn strip_brackets(line: &str) -> Option<&str> {
     })
 }
 
-/// Words in place of a number, which are not units.
 const NO_NUMBERS: [&str; 16] = [
     "nan", "inf", "infinity", "ovf", "ovl", "ovr", "over", "overflow", "overload", "err", "error", "fault",
     "null", "none", "na", "ol",
 ];
 
-/// True for a word that may be the symbol of a unit: `mV`, `°C`, `%`, `m/s2`.
+/// A symbol such as `mV`, `°C`, `%`, `m/s2`.
 fn is_unit(word: &str) -> bool {
     let is_sign = |letter: char| letter.is_alphabetic() || "%°²³".contains(letter);
     let is_part = |letter: char| is_sign(letter) || letter.is_ascii_digit() || "/^*·".contains(letter);
@@ -155,8 +145,7 @@ fn is_unit(word: &str) -> bool {
 
 const SEPARATORS: [char; 4] = [',', ';', '|', '\t'];
 
-/// The items of a line, with decimal commas or without; `None` for a line with text that is neither a name nor a unit. `is_name` is true for known
-/// names.
+/// Items of a line; `None` for other text.
 pub fn items<'a>(
     line: &'a str,
     decimal_comma: bool,
@@ -182,7 +171,6 @@ pub fn items<'a>(
     Some(items)
 }
 
-/// Unit of the preceding value, and name of the following value, from the text between two values.
 fn unit_and_name<'a>(
     between: &'a str,
     is_first: bool,
@@ -213,7 +201,6 @@ fn unit_and_name<'a>(
     ((unit.is_empty() || is_unit(unit)) && name_is_plain && name_is_one).then_some((unit, name))
 }
 
-/// True for two consecutive separators of one kind: a value is missing between them.
 fn has_empty_field(text: &str) -> bool {
     let mut last = None;
     text.chars().filter(|letter| *letter != ' ').any(|letter| {
@@ -223,8 +210,7 @@ fn has_empty_field(text: &str) -> bool {
     })
 }
 
-/// Start and end of the next number that is a value: not part of a word, and not a name before `:` or `=`. At the start of the text a number counts
-/// only if the line begins there.
+/// Range of the next number outside words and names; the first needs `is_line`.
 fn next_number(text: &str, decimal_comma: bool, is_line: bool) -> Option<(usize, usize)> {
     let bytes = text.as_bytes();
     let mut at = 0;
@@ -244,7 +230,6 @@ fn next_number(text: &str, decimal_comma: bool, is_line: bool) -> Option<(usize,
     None
 }
 
-/// Length of the number at the start of the bytes.
 fn number_length(bytes: &[u8], decimal_comma: bool) -> Option<usize> {
     let sign = usize::from(matches!(bytes.first(), Some(b'+' | b'-')));
     let count = |from: usize, is: fn(&u8) -> bool| {
@@ -274,7 +259,7 @@ fn number_length(bytes: &[u8], decimal_comma: bool) -> Option<usize> {
     Some(end)
 }
 
-/// Value of a number from [`items`]; `None` for a hexadecimal number of 4, 6 or 8 digits with the first bit set, which may be a negative number.
+/// Parses a number; `None` for a hexadecimal one of 4, 6 or 8 digits that may be negative.
 pub fn value(text: &str) -> Option<f64> {
     let (sign, digits) = text.strip_prefix('-').map_or((1.0, text), |digits| (-1.0, digits));
     let hexadecimal = digits.strip_prefix("0x").or_else(|| digits.strip_prefix("0X"));
@@ -284,14 +269,13 @@ pub fn value(text: &str) -> Option<f64> {
     (!is_ambiguous && value < 1 << 53).then_some(sign * value as f64)
 }
 
-/// True for a date, a time of day, or both.
 pub fn is_time(text: &str) -> bool {
     let text = text.trim();
     time_length(text) == Some(text.len())
 }
 
-/// Seconds of a date with a time of day (since 1970, without regard to its zone), or of a time of day alone. `None` where the text is neither, or has
-/// less than three digits of fractional seconds: such a clock cannot resolve the time between readings.
+/// Returns the seconds of the day, or since 1970 with a date, without the zone. `None` without milliseconds:
+/// such a clock does not resolve readings.
 pub fn time_s(text: &str) -> Option<f64> {
     let text = text.trim();
     if !is_time(text) {
@@ -323,7 +307,7 @@ pub fn time_s(text: &str) -> Option<f64> {
     Some(whole + format!("0.{fraction}").parse::<f64>().ok()?)
 }
 
-/// Days from 1970-01-01 to a civil date, computed in years that begin in March.
+/// Civil date in years that begin in March.
 fn days_since_1970(year: i64, month: i64, day: i64) -> i64 {
     let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
     let leap_days = year / 4 - year / 100 + year / 400;

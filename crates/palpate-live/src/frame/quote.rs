@@ -2,10 +2,9 @@
 
 use std::fmt::Write;
 
-/// Most characters of a quotation.
 const MOST: usize = 80;
 
-/// The bytes in a form for messages: letters, digits and printable ASCII unchanged, others escaped, and an ellipsis after 80 characters.
+/// Escapes unprintable bytes, and cuts after 80 characters.
 pub fn quote(bytes: &[u8]) -> String {
     let mut quotation = String::new();
     let mut length = 0;

@@ -1,10 +1,10 @@
-//! Reader of the frames of a source, with counts of bad frames.
+//! Reader of frames.
 
 use super::{BadFrame, Channel, ColumnsError, Decoder, Frame};
 use crate::input::Arrival;
 use std::collections::BTreeMap;
 
-/// Reader of the frames of a source: decodes the arrivals, and counts readings and bad frames.
+/// Decoder of arrivals that counts readings and bad frames.
 #[derive(Debug)]
 pub struct FrameReader {
     decoder: Decoder,
@@ -16,7 +16,7 @@ pub struct FrameReader {
 }
 
 impl FrameReader {
-    /// Reader of frames with these channels.
+    /// Creates a reader of frames with these channels.
     pub fn new(channels: &[Channel]) -> Self {
         Self {
             decoder: Decoder::new(channels),
@@ -28,15 +28,15 @@ impl FrameReader {
         }
     }
 
-    /// Names the values of frames without names, see [`Decoder::set_columns`].
+    /// Names the values of frames, see [`Decoder::set_columns`].
     ///
     /// # Errors
-    /// [`ColumnsError`] unless every channel is named once.
+    /// [`ColumnsError`].
     pub fn set_columns(&mut self, columns: &[String]) -> Result<(), ColumnsError> {
         self.decoder.set_columns(columns)
     }
 
-    /// Reads an arrival of the source; returns the frames that are readings.
+    /// Returns the readings of an arrival.
     pub fn receive(&mut self, arrival: &Arrival) -> Vec<Frame> {
         let mut frames = Vec::new();
         let hand_on = |frame| frames.push(frame);
@@ -78,7 +78,7 @@ impl FrameReader {
         self.last_cause = Some(cause);
     }
 
-    /// Counts a frame from [`Self::receive`] as a bad one.
+    /// Counts a received frame as a bad one.
     pub fn refuse(&mut self, cause: BadFrame) {
         self.readings -= 1;
         self.count_bad(cause);
@@ -89,22 +89,22 @@ impl FrameReader {
         self.readings
     }
 
-    /// Numbers of bad frames by cause.
+    /// Bad frames by cause.
     pub fn bad_frames(&self) -> &BTreeMap<BadFrame, u64> {
         &self.bad
     }
 
-    /// Number of bad frames since the last reading, or the opening of the source.
+    /// Bad frames since the last reading or opening.
     pub fn bad_in_a_row(&self) -> u64 {
         self.bad_in_a_row
     }
 
-    /// Cause and quotation of the last bad frame; `None` before the first one.
+    /// Cause and quotation of the last bad frame.
     pub fn last_bad_frame(&self) -> Option<(BadFrame, String)> {
         self.last_cause.zip(self.decoder.last_bad())
     }
 
-    /// Bytes since the end of the last frame.
+    /// Bytes of the unfinished frame.
     pub fn unfinished(&self) -> &[u8] {
         self.decoder.unfinished()
     }

@@ -6,69 +6,60 @@ use super::printed::{self, Item};
 use super::{BadFrame, Frame};
 use palpate_mechanics::units::Unit;
 
-/// Reading of a line of text.
 #[derive(Debug)]
 pub enum Line {
     /// Blank, or a comment.
     Nothing,
-    /// Names of the values of the lines that follow.
+    /// Names of the following values.
     Header,
-    /// A frame of values without names. If the start of the line is missing, its first value may lack its first digits.
+    /// Values without names; the first may be cut.
     Unnamed(Frame),
-    /// A frame that would be invalid if the start of its line were missing.
+    /// A frame that is certainly complete.
     Whole(Frame),
 }
 
-/// Reader of lines of text.
 #[derive(Debug)]
 pub struct TextReader {
     names: Names,
-    /// Roles of values without names: the channels in their order, until a header or a user names them.
     columns: Vec<Role>,
-    /// Names of the last line with names, with their roles: most lines repeat them.
+    /// Names of the last line, which most lines repeat.
     known: Vec<(Vec<u8>, Role)>,
-    /// Unit of each raw channel in the lines so far, if they had one.
     units: Vec<Option<String>>,
-    /// Label before the values of the first printed line, possibly empty. Lines with another label contain other values.
+    /// First label; lines with another one contain other values.
     label: Option<String>,
-    /// Values of a reading with one line per channel; `None` before the line of the first channel.
+    /// Incomplete reading with one line per channel.
     partial: Option<Vec<Option<f64>>>,
 }
 
 impl TextReader {
-    /// Reader of frames of these channels.
     pub fn new(names: Names) -> Self {
         let columns = (0..names.len()).map(Role::Channel).collect();
         let units = vec![None; names.len()];
         Self { names, columns, known: Vec::new(), units, label: None, partial: None }
     }
 
-    /// Names of channels.
     pub fn names(&self) -> &Names {
         &self.names
     }
 
-    /// Roles of values without names.
     pub fn columns(&self) -> &[Role] {
         &self.columns
     }
 
-    /// Sets the roles of values without names.
     pub fn set_columns(&mut self, columns: Vec<Role>) {
         self.columns = columns;
     }
 
-    /// Discards the lines of an incomplete reading.
+    /// Discards an incomplete reading.
     pub fn open(&mut self) {
         self.partial = None;
     }
 
-    /// Reads a line without its end: in a form for programs, else as printed for people.
+    /// Reads a line without its end.
     pub fn read(&mut self, line: &[u8]) -> Result<Line, BadFrame> {
         self.read_form(line).or_else(|cause| self.read_printed(line, cause))
     }
 
-    /// Reads values, names with values, a header, or JSON.
     fn read_form(&mut self, line: &[u8]) -> Result<Line, BadFrame> {
         let line = line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(line).trim_ascii();
         let Some(first) = line.first() else { return Ok(Line::Nothing) };
@@ -84,7 +75,7 @@ impl TextReader {
         }
     }
 
-    /// Reads a line by the rules of [`printed`]. `cause` is the reason why it is not in a form for programs.
+    /// Reads a line by the rules of [`printed`]; `cause` is the error of other forms.
     #[cold]
     fn read_printed(&mut self, line: &[u8], cause: BadFrame) -> Result<Line, BadFrame> {
         let line = printed::without_colours(line);
@@ -118,7 +109,7 @@ impl TextReader {
         }
     }
 
-    /// Reads items that all have names, or none, or one label before the values.
+    /// All items have names, or none, or one label.
     fn read_items(&mut self, items: &[Item], cause: BadFrame) -> Result<Line, BadFrame> {
         let is_named = items.iter().all(|item| !item.name.is_empty());
         let label = items[0].name;
@@ -166,8 +157,7 @@ impl TextReader {
         Ok(if is_named || !label.is_empty() { Line::Whole(frame) } else { Line::Unnamed(frame) })
     }
 
-    /// Adds a line of the plotter Teleplot to a reading, which begins with the line of the first channel. The form is `name:value` or
-    /// `name:time:value`, then optionally `§unit` and `|flags`.
+    /// Adds a line of Teleplot, `name:value` or `name:time:value` with optional `§unit` and `|flags`.
     fn add_to_partial(&mut self, line: &str, cause: BadFrame) -> Result<Line, BadFrame> {
         let line = line.split(['§', '|']).next().unwrap_or_default();
         let last = line.rsplit(';').next().unwrap_or_default();
@@ -180,7 +170,7 @@ impl TextReader {
         if channel == 0 {
             torn = self.partial.replace(vec![None; self.names.len()]);
         }
-        // Lines before that of the first channel belong to a reading with a missing start.
+        // The reading has no start.
         let Some(partial) = &mut self.partial else { return Ok(Line::Nothing) };
         partial[channel] = Some(value);
         if partial.iter().any(Option::is_none) {
@@ -237,7 +227,6 @@ impl TextReader {
         frame.finish()
     }
 
-    /// Reads a line with a field that is not a number as a header of names.
     fn header(&mut self, fields: Fields) -> Result<Line, BadFrame> {
         let separator = fields.separator;
         let mut roles = Vec::new();
@@ -263,7 +252,6 @@ impl TextReader {
     }
 }
 
-/// Role of the name of the `i`-th value of a line.
 fn role_of(names: &Names, known: &mut Vec<(Vec<u8>, Role)>, i: usize, name: &[u8]) -> Role {
     if let Some((last, role)) = known.get(i)
         && last == name
@@ -281,7 +269,7 @@ fn role_of(names: &Names, known: &mut Vec<(Vec<u8>, Role)>, i: usize, name: &[u8
     role
 }
 
-/// True for a general label of values, such as `Reading` or `HX711 reading`, which does not distinguish them from other values.
+/// A label such as `Reading` or `HX711 reading`.
 fn is_general_label(label: &str) -> bool {
     const LABELS: [&str; 13] = [
         "adc",
@@ -303,7 +291,6 @@ fn is_general_label(label: &str) -> bool {
     label.chars().all(is_part) && LABELS.iter().any(|known| known.eq_ignore_ascii_case(word))
 }
 
-/// Factor that converts a value from `unit` to the unit of its role. A raw channel has the unit of its first line.
 fn factor(names: &Names, units: &[Option<String>], role: Role, unit: &str) -> Result<f64, BadFrame> {
     match role {
         Role::Channel(i) if names.channel(i).unit == Unit::NONE => match &units[i] {
@@ -328,22 +315,18 @@ fn factor(names: &Names, units: &[Option<String>], role: Role, unit: &str) -> Re
     }
 }
 
-/// True for a field with a name; the colons of a time of day do not follow a name.
 fn begins_with_name(field: &[u8]) -> bool {
     let is_time = || std::str::from_utf8(field).is_ok_and(printed::is_time);
     named(field).is_some() && !(field[0].is_ascii_digit() && is_time())
 }
 
-/// Name and value of a field; `None` without a name.
 fn named(field: &[u8]) -> Option<(&[u8], &[u8])> {
     let at = field.iter().position(|byte| matches!(byte, b':' | b'='))?;
     Some((field[..at].trim_ascii_end(), field[at + 1..].trim_ascii_start()))
 }
 
-/// Most characters of a number with a decimal comma.
 const LONGEST_NUMBER: usize = 64;
 
-/// Parses a number; with a decimal comma too where commas are not separators.
 fn number(field: &[u8], separator: Separator) -> Option<f64> {
     let parse = |bytes: &[u8]| std::str::from_utf8(bytes).ok()?.parse().ok();
     let comma = || field.iter().position(|byte| *byte == b',');
@@ -362,7 +345,6 @@ fn number(field: &[u8], separator: Separator) -> Option<f64> {
     }
 }
 
-/// Kinds of bytes in a line.
 #[derive(Clone, Copy)]
 struct Marks(u8);
 
@@ -374,7 +356,6 @@ impl Marks {
     const NAMED: u8 = 1 << 4;
     const CONTROL: u8 = 1 << 5;
 
-    /// Kinds by byte.
     const KINDS: [u8; 256] = {
         let mut kinds = [0; 256];
         let mut byte = 0;
@@ -402,12 +383,10 @@ impl Marks {
     }
 }
 
-/// True for bytes that may be lines of text: without control characters except tabs, line ends and the escape of terminals.
 pub fn is_text(bytes: &[u8]) -> bool {
     bytes.iter().all(|byte| matches!(byte, b'\t' | b'\r' | b'\n' | 0x1B) || !byte.is_ascii_control())
 }
 
-/// Separator of the values of a line.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Separator {
     Comma,
@@ -430,14 +409,13 @@ impl Separator {
     }
 }
 
-/// True where every comma is between two digits: if the line has blanks, the blanks are the separators.
+/// Commas between digits; blanks are then the separators.
 fn commas_are_decimal(line: &[u8]) -> bool {
     let digit = |i: usize| line.get(i).is_some_and(u8::is_ascii_digit);
     let decimal = |(i, byte): (usize, &u8)| *byte != b',' || (i > 0 && digit(i - 1) && digit(i + 1));
     line.iter().enumerate().all(decimal)
 }
 
-/// Fields of a line; one separator may follow the last.
 #[derive(Clone)]
 struct Fields<'a> {
     rest: Option<&'a [u8]>,
@@ -630,7 +608,7 @@ mod tests {
             Ok(other) => panic!("{line}: {other:?}"),
             Err(cause) => Err(cause),
         };
-        // The end of a reading with a missing start.
+        // The end of a reading without a start.
         assert_eq!(read(">b:9"), Ok(None));
         assert_eq!(read(">a:1.5"), Ok(None));
         assert_eq!(read(">temperature:21"), Ok(None));

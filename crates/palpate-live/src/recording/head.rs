@@ -1,4 +1,4 @@
-//! Head of a recording: describes the source and channels of its readings.
+//! Head of a recording.
 
 use super::RecordingError;
 use crate::frame::Channel;
@@ -8,16 +8,16 @@ use palpate_mechanics::surface::Extent;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Head of a recording.
+/// Description of the readings of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Head {
-    /// Version of palpate that wrote it.
+    /// Version of palpate.
     pub version: String,
-    /// The source of the readings, as its URL.
+    /// URL of the source.
     pub source: String,
-    /// Channels of a reading, in their order.
+    /// Channels of a reading.
     pub channels: Vec<RecordedChannel>,
-    /// Method by which the session made estimates from tared readings.
+    /// Method of estimation.
     pub estimation: Estimation,
 }
 
@@ -26,17 +26,16 @@ pub struct Head {
 pub struct RecordedChannel {
     /// Name of the sensor.
     pub name: String,
-    /// Name in the frames of the board.
+    /// Name in the frames.
     pub label: String,
-    /// Symbol of the unit of the recorded numbers.
+    /// Symbol of the unit.
     pub unit: String,
 }
 
-/// Session to record: its head, units and topics.
 #[derive(Clone, Debug)]
 pub(super) struct Subject {
     pub head: Head,
-    /// The text of the locator file.
+    /// Text of the locator file.
     pub locator: String,
     pub channels: Vec<Channel>,
     pub extent: Extent,
@@ -62,13 +61,10 @@ impl Subject {
     }
 }
 
-/// Name of the metadata of a recording.
 pub(super) const METADATA: &str = "palpate";
-/// Name of the attachment with the locator.
 pub(super) const LOCATOR: &str = "locator.json";
 
 impl Head {
-    /// Metadata of the MCAP file for this head.
     pub(super) fn metadata(&self) -> BTreeMap<String, String> {
         let channels = serde_json::to_string(&self.channels).unwrap_or_default();
         let estimation = serde_json::to_string(&self.estimation).unwrap_or_default();
@@ -81,8 +77,7 @@ impl Head {
         ])
     }
 
-    /// Reads the head from metadata; `None` where the channels are missing, or the estimation is unknown. Without an estimation each reading was
-    /// located by itself.
+    /// Reads the head. A missing estimation means [`Estimation::Single`].
     pub(super) fn from_metadata(metadata: &BTreeMap<String, String>) -> Option<Self> {
         let text = |key: &str| metadata.get(key).cloned().unwrap_or_default();
         let estimation = match metadata.get("estimation") {

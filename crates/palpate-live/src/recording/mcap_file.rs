@@ -1,4 +1,4 @@
-//! Reads the records of an MCAP file one by one, without the whole file in memory. Blocks of messages are skipped, and decoded on demand.
+//! Reader of the blocks of an MCAP file.
 
 use super::head::{Head, LOCATOR, METADATA};
 use super::unpack::{self, BlockFault, MOST};
@@ -13,77 +13,60 @@ use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// Most bytes of a block of messages outside chunks: as many as are decoded at once.
 const MOST_LOOSE: u64 = 1 << 20;
 
-/// An MCAP file of palpate, cut off or whole.
+/// A complete or cut-off MCAP file of palpate.
 #[derive(Debug)]
 pub struct McapFile {
     file: BufReader<File>,
     path: String,
     length: u64,
-    /// Head of the recording.
     pub head: Head,
-    /// Text of the attached locator file.
     locator: Result<String, LocatorFault>,
-    /// Blocks of messages, in the order of the file.
     pub blocks: Vec<Block>,
-    /// True for a complete end of the file.
     pub is_whole: bool,
-    /// Place of the record that ends the data, and the checksum of all bytes before it, if it has one.
+    /// End of the data, and checksum.
     data_checksum: Option<(u64, u32)>,
-    /// Topic of each channel, as its index in [`TOPICS`]; `None` for a topic that is not one of palpate.
+    /// Indices in [`TOPICS`].
     channels: BTreeMap<u16, Option<usize>>,
 }
 
-/// Block of messages in the file.
+/// Block of messages.
 #[derive(Clone, Copy, Debug)]
 pub struct Block {
     kind: BlockKind,
     at: u64,
     length: u64,
-    /// Times of the first and the last message, in ns since 1970.
     pub span_ns: (u64, u64),
-    /// Number of readings in the block.
     pub readings: u64,
 }
 
-/// Kind of a block of messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum BlockKind {
-    /// A record that contains messages.
     Chunk,
-    /// Records of messages, one after the other.
+    /// Messages outside chunks.
     Loose,
 }
 
-/// Messages of a block.
 #[derive(Clone, Debug, Default)]
 pub struct Messages {
-    /// The messages on topics of palpate.
     pub messages: Vec<RawMessage>,
-    /// Number of messages on other topics.
+    /// Messages on foreign topics.
     pub foreign: u64,
-    /// Number of messages on a channel that the file does not describe.
     pub unknown: u64,
-    /// Fault that makes the block unreadable.
     pub fault: Option<BlockFault>,
 }
 
-/// Message of a recording.
 #[derive(Clone, Debug)]
 pub struct RawMessage {
-    /// Topic, as its index in [`TOPICS`].
+    /// Index in [`TOPICS`].
     pub topic: usize,
-    /// Sequence number.
     pub sequence: u32,
-    /// Time, in ns since 1970.
     pub unix_ns: u64,
-    /// Content as JSON.
+    /// JSON.
     pub data: Vec<u8>,
 }
 
-/// Kind of a record, and the place of its content.
 struct RecordPlace {
     op: u8,
     at: u64,
@@ -91,7 +74,6 @@ struct RecordPlace {
 }
 
 impl RecordPlace {
-    /// Bytes of the kind and the length before the content.
     const HEAD: u64 = 9;
 
     fn end(&self) -> u64 {
@@ -100,10 +82,7 @@ impl RecordPlace {
 }
 
 impl McapFile {
-    /// Reads the head of a file, and scans it for blocks of messages.
-    ///
-    /// # Errors
-    /// [`RecordingError`] for a file that cannot be read, or is not a recording of palpate.
+    /// Reads head and blocks of a file.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let shown = path.display().to_string();
         let (file, length) = open_regular(path).map_err(|error| cannot("open", &shown, error))?;
@@ -128,7 +107,6 @@ impl McapFile {
         Ok(own)
     }
 
-    /// Text of the attached locator file.
     pub fn locator(&self) -> Result<&str, RecordingError> {
         let fault = |fault: &LocatorFault| RecordingError::Locator { path: self.path.clone(), fault: *fault };
         self.locator.as_deref().map_err(fault)
@@ -137,7 +115,7 @@ impl McapFile {
     fn look_through(&mut self) -> Result<(), RecordingError> {
         self.check_magic()?;
         let mut metadata = None;
-        // False while the readings of the last chunk are not yet counted. The index gives their number, or else the decoded chunk.
+        // False until the readings of the last chunk are counted, from the index or the decoded chunk.
         let mut counted = true;
         while let Some(place) = self.next_place()? {
             match place.op {
@@ -203,7 +181,7 @@ impl McapFile {
         Ok(())
     }
 
-    /// Checks messages outside chunks by the checksum of all data. Chunks have their own checksums. True without such messages or without a checksum.
+    /// Compares messages outside chunks with the checksum of all data.
     pub fn check_loose(&mut self) -> Result<bool, RecordingError> {
         let is_loose = self.blocks.iter().any(|block| block.kind == BlockKind::Loose);
         let Some((end, checksum)) = self.data_checksum.filter(|_| is_loose) else { return Ok(true) };
@@ -230,7 +208,6 @@ impl McapFile {
         }
     }
 
-    /// Adds a chunk to the blocks; false for a record that is too short for a chunk.
     fn add_chunk(&mut self, place: &RecordPlace) -> Result<bool, RecordingError> {
         let Some([start_ns, end_ns]) = self.numbers(place)? else { return Ok(false) };
         let span_ns = (start_ns, end_ns);
@@ -239,7 +216,6 @@ impl McapFile {
         Ok(true)
     }
 
-    /// Adds a message outside chunks to the block before it, or to a new one.
     fn add_loose(&mut self, place: &RecordPlace) -> Result<(), RecordingError> {
         // A message begins with channel and number, then the times.
         let Some([head, head_and_time]) = self.numbers(place)? else { return Ok(()) };
@@ -266,7 +242,6 @@ impl McapFile {
         Ok(())
     }
 
-    /// The first two numbers of 8 bytes of a record; `None` for a shorter record.
     fn numbers(&mut self, place: &RecordPlace) -> Result<Option<[u64; 2]>, RecordingError> {
         if place.length < 16 {
             return Ok(None);
@@ -278,7 +253,6 @@ impl McapFile {
         Ok(Some(bytes.map(u64::from_le_bytes)))
     }
 
-    /// Decodes the last chunk to count its readings, unless an index gave the count.
     fn count_last(&mut self, counted: bool) -> Result<(), RecordingError> {
         let Some(last) = self.blocks.last().copied().filter(|_| !counted) else { return Ok(()) };
         let here = self.position()?;
@@ -290,7 +264,6 @@ impl McapFile {
         self.seek(here)
     }
 
-    /// Messages of a block. The result contains the fault of a damaged block.
     pub fn messages(&mut self, block: &Block) -> Result<Messages, RecordingError> {
         let mut found = Messages::default();
         let Some(body) = self.body(block.at, block.length)? else {
@@ -306,7 +279,6 @@ impl McapFile {
         Ok(found)
     }
 
-    /// Adds a channel or a message of a block.
     fn take(&mut self, record: Record, found: &mut Messages) {
         match record {
             Record::Message { header, data } => match self.channels.get(&header.channel_id) {
@@ -330,8 +302,7 @@ impl McapFile {
         }
     }
 
-    /// The locator, if this attachment contains it. A damaged attachment counts as the locator: a recording has no other attachment, and the damage
-    /// may be in the name.
+    /// A damaged attachment counts as locator: its name may be damaged.
     fn attached(&mut self, place: &RecordPlace) -> Result<Result<String, LocatorFault>, RecordingError> {
         let body = self.body(place.at, place.length)?;
         Ok(match body.as_deref().and_then(|body| parse(op::ATTACHMENT, body)) {
@@ -348,7 +319,6 @@ impl McapFile {
         Ok(parse(place.op, &body).map(Record::into_owned))
     }
 
-    /// The next whole record. The file is then at the content of the record.
     fn next_place(&mut self) -> Result<Option<RecordPlace>, RecordingError> {
         let at = self.position()?.saturating_add(RecordPlace::HEAD);
         if at > self.length {
@@ -369,7 +339,7 @@ impl McapFile {
         let mut body = vec![0; length as usize];
         match self.file.read_exact(&mut body) {
             Ok(()) => Ok(Some(body)),
-            // The file was cut off meanwhile.
+            // The file was truncated meanwhile.
             Err(error) if error.kind() == ErrorKind::UnexpectedEof => Ok(None),
             Err(error) => Err(self.cannot(error)),
         }
@@ -379,7 +349,7 @@ impl McapFile {
         self.file.stream_position().map_err(|error| cannot("read", &self.path, error))
     }
 
-    /// Moves to a place; buffered bytes are kept for a near one.
+    /// Keeps buffered bytes for a near position.
     fn seek(&mut self, to: u64) -> Result<(), RecordingError> {
         let here = self.position()?;
         let by = i64::try_from(i128::from(to) - i128::from(here)).ok();
@@ -395,7 +365,7 @@ impl McapFile {
     }
 }
 
-/// Opens a regular file, and returns it with its length. Does not wait for a writer if the path is a pipe.
+/// Does not wait for a writer if the path is a pipe.
 fn open_regular(path: &Path) -> std::io::Result<(File, u64)> {
     let mut options = File::options();
     options.read(true);

@@ -1,8 +1,7 @@
-//! Recordings of sessions: MCAP files, which Foxglove and the official readers open.
+//! Recordings of sessions: MCAP files for Foxglove and other readers.
 //!
-//! A recording contains the readings of the board (`/reading`), their estimates (`/estimate`) and the events of the session (`/event`), all as
-//! JSON with schemas. The locator is an attachment, so the file is sufficient for a later evaluation. A file that was cut off is read up to the
-//! cut.
+//! Topics are `/reading`, `/estimate` and `/event` in JSON, with the locator as attachment. Cut-off files are
+//! readable.
 
 mod head;
 mod mcap_file;
@@ -24,82 +23,82 @@ pub use unpack::BlockFault;
 /// File extension of recordings.
 pub const EXTENSION: &str = "mcap";
 
-/// Fault of the locator that is attached to a recording.
+/// Fault of an attached locator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LocatorFault {
-    /// The recording has no attached locator.
+    /// No attachment.
     #[error("no `locator.json` is attached")]
     Missing,
-    /// The file ends before the attachment.
+    /// The file ends too early.
     #[error("the file is cut off before its attached `locator.json`")]
     CutOff,
-    /// The bytes of the attachment differ from those that were written.
+    /// Damaged bytes.
     #[error("the attached `locator.json` is damaged: its bytes do not match their checksum and lengths")]
     Damaged,
 }
 
-/// A recording that cannot be made or read.
+/// Error of a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
-    /// The file cannot be made, opened or read.
+    /// The file cannot be created, opened or read.
     #[error("cannot {verb} {path}: {error}")]
     File {
-        /// The action that failed.
+        /// Action.
         verb: &'static str,
-        /// The file.
+        /// File.
         path: String,
         /// Cause.
         error: std::io::Error,
     },
-    /// The file exists already, and is not overwritten.
+    /// The file exists.
     #[error("cannot record into {path}: it exists already; name another file")]
     Exists {
-        /// The file.
+        /// File.
         path: String,
     },
-    /// A name that a recording cannot have.
+    /// An invalid name.
     #[error(
         "`{name}` is not a name of a recording: use at most 100 letters, digits, dots, dashes and underscores, and do not start with a dot"
     )]
     Name {
-        /// The name.
+        /// Name.
         name: String,
     },
-    /// A link, a pipe, a device or a folder has the name of a recording.
+    /// A link, a pipe, a device or a folder.
     #[error("{path} is not a regular file")]
     NotRegular {
-        /// The file.
+        /// File.
         path: String,
     },
-    /// A recording is active, and a second one cannot begin.
+    /// Another recording is active.
     #[error("{name} is being recorded; end it first")]
     GoesOn {
-        /// Name of the active recording.
+        /// Active recording.
         name: String,
     },
-    /// The file is not MCAP.
+    /// Not an MCAP file.
     #[error("{path} is not an MCAP file")]
     NotMcap {
-        /// The file.
+        /// File.
         path: String,
     },
-    /// The file is MCAP, but not a recording of palpate.
+    /// Not a recording of palpate.
     #[error("{path} is not a recording of palpate: {lacks}")]
     NotOurs {
-        /// The file.
+        /// File.
         path: String,
-        /// The missing part.
+        /// Missing part.
         lacks: &'static str,
     },
-    /// The locator of the recording cannot be read; its readings can.
+    /// The locator is unreadable; readings are available.
     #[error("{path}: {fault}")]
     Locator {
-        /// The file.
+        /// File.
         path: String,
-        /// The fault.
+        /// Fault.
         fault: LocatorFault,
     },
-    /// The record cannot be written in MCAP.
+    /// A record cannot be encoded.
     #[error("cannot encode the recording: {0}")]
     Encode(String),
 }

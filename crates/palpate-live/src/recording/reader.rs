@@ -1,4 +1,4 @@
-//! Readers of recordings: lists of them, thinned parts for charts, and all messages of one in their order.
+//! Readers of recordings.
 
 use super::head::RecordedChannel;
 use super::mcap_file::{Block, McapFile, RawMessage};
@@ -12,37 +12,37 @@ use std::path::Path;
 pub struct RecordingSummary {
     /// Name of the file.
     pub name: String,
-    /// Bytes of the file.
+    /// Size of the file.
     pub bytes: u64,
-    /// First instant, in seconds since 1970-01-01 00:00 UTC; `None` without any.
+    /// Start in seconds since 1970-01-01 00:00 UTC.
     pub start_s: Option<f64>,
-    /// Seconds from the first instant to the last.
+    /// Duration in seconds.
     pub seconds: f64,
     /// Number of readings.
     pub readings: u64,
-    /// True where the end is missing: the recording is active, or was cut off.
+    /// True for an active or cut-off recording.
     pub is_cut_off: bool,
 }
 
-/// Part of a recording, thinned to a number of samples.
+/// Thinned part of a recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Excerpt {
     /// Channels of a reading.
     pub channels: Vec<RecordedChannel>,
-    /// First instant of the recording, in seconds since 1970-01-01 00:00 UTC; `None` without any.
+    /// Start of the recording in seconds since 1970-01-01 00:00 UTC.
     pub start_s: Option<f64>,
-    /// Seconds from the first instant of the recording to its last.
+    /// Duration of the recording in seconds.
     pub seconds: f64,
-    /// Samples, in the form of [`SampleRecord`](crate::sample::SampleRecord).
+    /// Samples as [`SampleRecord`](crate::sample::SampleRecord).
     pub samples: Vec<Value>,
-    /// All events, in the form of [`EventRecord`](crate::event::EventRecord).
+    /// All events as [`EventRecord`](crate::event::EventRecord).
     pub events: Vec<Value>,
 }
 
-/// Recordings in a folder, newest first, recordings without an instant last. Other files, links and pipes are omitted. A missing folder has none.
+/// Lists the recordings of a folder, newest first.
 ///
 /// # Errors
-/// [`RecordingError::File`] for a folder that cannot be read.
+/// An unreadable folder.
 pub fn list(folder: &Path) -> Result<Vec<RecordingSummary>, RecordingError> {
     let entries = match std::fs::read_dir(folder) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
@@ -65,10 +65,10 @@ pub fn list(folder: &Path) -> Result<Vec<RecordingSummary>, RecordingError> {
     Ok(found)
 }
 
-/// Summary of one recording.
+/// Reads the summary of a recording.
 ///
 /// # Errors
-/// [`RecordingError`] for a file that cannot be read, or is not a recording of palpate.
+/// An unreadable file, or not a recording.
 pub fn summary(path: &Path) -> Result<RecordingSummary, RecordingError> {
     let file = McapFile::open(path)?;
     let (start_s, seconds) = span_s(&file.blocks);
@@ -82,10 +82,10 @@ pub fn summary(path: &Path) -> Result<RecordingSummary, RecordingError> {
     })
 }
 
-/// The part of a recording between two times in seconds from its start, thinned evenly to at most `points` samples and the last one.
+/// Reads a part in seconds from the start, thinned to `points` samples and the last.
 ///
 /// # Errors
-/// [`RecordingError`] for a file that cannot be read, or is not a recording of palpate.
+/// An unreadable file, or not a recording.
 pub fn read(path: &Path, from_s: f64, to_s: f64, points: usize) -> Result<Excerpt, RecordingError> {
     let mut file = McapFile::open(path)?;
     let (start_s, seconds) = span_s(&file.blocks);
@@ -116,7 +116,7 @@ pub fn read(path: &Path, from_s: f64, to_s: f64, points: usize) -> Result<Excerp
 }
 
 fn span_s(blocks: &[Block]) -> (Option<f64>, f64) {
-    // A chunk without messages, or with messages from before the clock was known, has the time 0.
+    // A chunk without messages, or with messages before the clock was set, has the time 0.
     let blocks = || blocks.iter().filter(|block| block.span_ns.0 > 0);
     let (start, end) =
         (blocks().map(|block| block.span_ns.0).min(), blocks().map(|block| block.span_ns.1).max());
@@ -124,18 +124,15 @@ fn span_s(blocks: &[Block]) -> (Option<f64>, f64) {
     (start.map(|start| start as f64 * 1e-9), seconds)
 }
 
-/// Thinning of samples: one in `stride` is kept.
 struct Thinning {
     stride: u64,
     channels: Vec<RecordedChannel>,
     count: u64,
     samples: Vec<Value>,
-    /// The last reading, not yet added, and whether it is kept in any case or only as the last one.
     last: Option<(Pending, Keep)>,
     events: Vec<Value>,
 }
 
-/// A reading that waits for its estimate.
 struct Pending {
     reading: RawMessage,
     estimate: Option<RawMessage>,
@@ -191,7 +188,6 @@ impl Thinning {
     }
 }
 
-/// A message of `/reading`.
 #[derive(Deserialize)]
 struct ReadingIn {
     number: u64,
@@ -204,39 +200,39 @@ impl ReadingIn {
     }
 }
 
-/// One message of a recording.
+/// Message of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Recorded {
-    /// A reading, as the board sent it.
+    /// A reading.
     Reading {
-        /// Number of the reading in the session, from 0.
+        /// Number, from 0.
         number: u64,
-        /// Time, in ns since 1970.
+        /// Time in ns since 1970.
         unix_ns: u64,
-        /// One number per channel, in the units of the channels in the head.
+        /// Values in the units of the head.
         values: Vec<f64>,
     },
-    /// The estimate of a reading.
+    /// An estimate.
     Estimate {
         /// Number of the reading.
         number: u64,
-        /// Time, in ns since 1970.
+        /// Time in ns since 1970.
         unix_ns: u64,
-        /// The reading that was located, in SI units or raw.
+        /// Located reading in SI units or raw.
         located: Vec<f64>,
-        /// Fields of the estimate's record.
+        /// Record.
         estimate: Map<String, Value>,
     },
     /// An event.
     Event {
-        /// Time, in ns since 1970.
+        /// Time in ns since 1970.
         unix_ns: u64,
-        /// Fields of the event's record.
+        /// Record.
         event: Map<String, Value>,
     },
 }
 
-/// Playback of all messages of a recording, in their order.
+/// Iterator over the messages of a recording.
 #[derive(Debug)]
 pub struct Playback {
     file: McapFile,
@@ -245,25 +241,25 @@ pub struct Playback {
     passed_over: PassedOver,
 }
 
-/// Numbers of blocks and messages that a playback has skipped so far.
+/// Skipped blocks and messages of a playback.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PassedOver {
-    /// Blocks of messages that cannot be read.
+    /// Unreadable blocks.
     pub blocks: u64,
-    /// Readings in those blocks, as far as an index gives their number.
+    /// Readings in unreadable blocks, if an index counts them.
     pub readings: u64,
-    /// Fault of the first of those blocks.
+    /// Fault of the first unreadable block.
     pub fault: Option<BlockFault>,
-    /// Messages that are damaged, or on a channel that the file does not describe.
+    /// Messages that are damaged, or on channels without a description.
     pub messages: u64,
-    /// Messages on topics of other programs.
+    /// Messages on foreign topics.
     pub foreign: u64,
-    /// True where messages outside chunks do not match the checksum of the file. They are read all the same.
+    /// True if messages outside chunks do not match the checksum.
     pub is_altered: bool,
 }
 
 impl PassedOver {
-    /// Sentence on the data of palpate that cannot be read; `None` where all was read.
+    /// Describes the unreadable data.
     pub fn loss(&self) -> Option<String> {
         let blocks = (self.blocks > 0).then(|| {
             let fault = self.fault.as_ref().map_or_else(String::new, |fault| format!(": {fault}"));
@@ -281,43 +277,43 @@ impl PassedOver {
 }
 
 impl Playback {
-    /// Opens a recording, whole or cut off.
+    /// Opens a complete or cut-off recording.
     ///
     /// # Errors
-    /// [`RecordingError`] for a file that cannot be read, or is not a recording of palpate.
+    /// An unreadable file, or not a recording.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let mut file = McapFile::open(path)?;
         let passed_over = PassedOver { is_altered: !file.check_loose()?, ..PassedOver::default() };
         Ok(Self { file, block: 0, messages: Vec::new().into_iter(), passed_over })
     }
 
-    /// Head: version, source, channels.
+    /// Head.
     pub fn head(&self) -> &Head {
         &self.file.head
     }
 
-    /// Text of the attached locator file.
+    /// Attached locator file.
     ///
     /// # Errors
-    /// [`RecordingError::Locator`] where the recording has no readable locator. The readings are available all the same.
+    /// [`RecordingError::Locator`]; the readings are available.
     pub fn locator(&self) -> Result<&str, RecordingError> {
         self.file.locator()
     }
 
-    /// True for a recording with a complete end.
+    /// Returns whether the file has a complete end.
     pub fn is_whole(&self) -> bool {
         self.file.is_whole
     }
 
-    /// Numbers of blocks and messages that were skipped so far.
+    /// Skipped data.
     pub fn passed_over(&self) -> &PassedOver {
         &self.passed_over
     }
 
-    /// The next message of the recording; `None` at its end.
+    /// Reads the next message.
     ///
     /// # Errors
-    /// [`RecordingError::File`] for a file that cannot be read.
+    /// An unreadable file.
     pub fn next_recorded(&mut self) -> Result<Option<Recorded>, RecordingError> {
         while let Some(message) = self.next_message()? {
             match self.understand(&message) {
@@ -328,7 +324,6 @@ impl Playback {
         Ok(None)
     }
 
-    /// The next message as it is in the file; `None` at its end.
     pub(super) fn next_message(&mut self) -> Result<Option<RawMessage>, RecordingError> {
         loop {
             if let Some(message) = self.messages.next() {
@@ -360,7 +355,7 @@ impl Playback {
                 let mut estimate: Map<String, Value> = serde_json::from_slice(data).ok()?;
                 let number = estimate.remove("number")?.as_u64()?;
                 let located = estimate.remove("located")?;
-                // The covariance is not part of the estimate's record.
+                // The covariance is not part of the record.
                 estimate.remove("covariance_mm2");
                 let located = located.as_array()?.iter().map(Value::as_f64).collect::<Option<_>>()?;
                 Some(Recorded::Estimate { number, unix_ns, located, estimate })

@@ -1,4 +1,4 @@
-//! The recorder: a thread that writes a session into a file.
+//! Thread that records a session.
 
 use super::RecordingError;
 use super::head::{Head, LOCATOR, METADATA, Subject};
@@ -18,36 +18,33 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Most batches that wait for the thread; further ones are counted as lost.
 const WAITING: usize = 8192;
-/// Time between two writes. A killed process loses at most the data since the last write. Half of the promised 100 ms, as a margin on a busy machine.
+/// Half of the promised 100 ms that a killed process loses.
 const FLUSH_EVERY: Duration = Duration::from_millis(50);
-/// Bytes of messages in a chunk, unless the time for a write comes first.
 const CHUNK: u64 = 1 << 16;
-/// Most bytes that wait for a full disk; further readings are counted as lost.
 const MOST_PENDING: usize = 8 << 20;
-/// Time between two attempts to write to a full disk, and between two checks that the file still exists.
+/// Period of retries and checks of the file.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
-/// State of a recording.
+/// Status of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RecordingStatus {
     /// Name of the file.
     pub name: String,
-    /// Bytes of the file.
+    /// Size of the file.
     pub bytes: u64,
-    /// Seconds from the first reading to the last.
+    /// Duration in seconds.
     pub seconds: f64,
     /// Readings in the file.
     pub readings: u64,
-    /// Readings that are missing, because the disk was full or too slow.
+    /// Readings lost to a full or slow disk.
     pub lost: u64,
-    /// The present problem.
+    /// Current problem.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub problem: Option<String>,
 }
 
-/// Writes the batches of a session into a file, in a separate thread.
+/// Sink that writes a file in a separate thread.
 #[derive(Debug)]
 pub struct Recorder {
     to: Option<SyncSender<Arc<Batch>>>,
@@ -56,10 +53,6 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Begins a recording in a new file. Problems are reported to the session through `reports`.
-    ///
-    /// # Errors
-    /// [`RecordingError`] for a file that exists already or cannot be made.
     pub(super) fn begin(
         path: &Path,
         subject: Arc<Subject>,
@@ -87,12 +80,12 @@ impl Recorder {
         Ok(Self { to: Some(to), status, thread: Some(thread) })
     }
 
-    /// State of the recording.
+    /// Status.
     pub fn status(&self) -> RecordingStatus {
         lock(&self.status).clone()
     }
 
-    /// Ends the recording, and waits until the file is whole.
+    /// Ends the recording, and waits for the file.
     pub fn finish(mut self) -> RecordingStatus {
         self.close();
         self.status()
@@ -129,7 +122,6 @@ fn lock(status: &Mutex<RecordingStatus>) -> std::sync::MutexGuard<'_, RecordingS
     status.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Bytes that MCAP's writer has encoded.
 #[derive(Clone, Debug, Default)]
 struct Encoded(Arc<Mutex<Vec<u8>>>);
 
@@ -150,34 +142,30 @@ impl Write for Encoded {
     }
 }
 
-/// A recording in its thread. MCAP's writer writes into memory, which never fails; [`Tail`] writes the bytes into the file.
+/// The MCAP writer writes into memory, which never fails; [`Tail`] writes the file.
 struct Recording<'a> {
     writer: Writer<NoSeek<Encoded>>,
     encoded: Encoded,
     tail: Tail,
     subject: &'a Subject,
-    /// Name and factor of each channel.
     names: Vec<(String, f64)>,
     topics: [u16; 3],
     sequence: u32,
     scratch: Vec<u8>,
     times_ns: Option<(u64, u64)>,
-    /// Readings that were encoded; the status counts those in the file.
+    /// The status counts readings in the file.
     encoded_readings: u64,
     status: Arc<Mutex<RecordingStatus>>,
     reports: SyncSender<Input>,
-    /// Instant of the next attempt to write and the next check of the file.
     look_at: Instant,
     health: Health,
 }
 
-/// State of a recording's file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Health {
     Well,
-    /// The disk is full.
     Full,
-    /// The file no longer exists, or the encoder has failed: the recording has ended.
+    /// The file was removed, or the encoder failed: the recording has ended.
     Gone,
 }
 
@@ -275,7 +263,6 @@ impl<'a> Recording<'a> {
         self.writer.write_to_known_channel(&header, &self.scratch)
     }
 
-    /// Ends the chunk, and hands all pending bytes to the operating system.
     fn flush(&mut self) {
         if self.health == Health::Gone {
             return;
@@ -341,7 +328,6 @@ impl<'a> Recording<'a> {
         self.write();
     }
 
-    /// Reports a problem in the status, and to the session.
     fn trouble(&self, problem: &str) {
         lock(&self.status).problem = Some(problem.to_owned());
         self.report(problem);
@@ -354,7 +340,7 @@ impl<'a> Recording<'a> {
     }
 }
 
-/// Begins an MCAP file that is only appended to: its summary is at the end, and written bytes never change.
+/// Written bytes never change.
 fn begin_file(encoded: Encoded, subject: &Subject) -> Result<(Writer<NoSeek<Encoded>>, [u16; 3]), McapError> {
     let options = options(&subject.head.version).disable_seeking(true);
     let mut writer = options.create(NoSeek::new(encoded))?;
@@ -362,7 +348,6 @@ fn begin_file(encoded: Encoded, subject: &Subject) -> Result<(Writer<NoSeek<Enco
     Ok((writer, topics))
 }
 
-/// MCAP options of recordings.
 pub(super) fn options(version: &str) -> WriteOptions {
     WriteOptions::new()
         .compression(Some(Compression::Lz4))
@@ -370,7 +355,6 @@ pub(super) fn options(version: &str) -> WriteOptions {
         .library(format!("palpate {version}"))
 }
 
-/// Writes the description of a recording: metadata, the locator, and the channels of its topics. Returns the ids of the channels.
 pub(super) fn describe<W: Write + Seek>(
     writer: &mut Writer<W>,
     head: &Head,

@@ -1,4 +1,4 @@
-//! Recovery: rewrites a recording that was cut off or is damaged, with its index and summary.
+//! Recovery of damaged recordings.
 
 use super::recorder::{describe, options};
 use super::{PassedOver, Playback, RecordingError};
@@ -14,20 +14,20 @@ use std::path::Path;
 pub struct Recovery {
     /// Readings in the new file.
     pub readings: u64,
-    /// Messages in the new file, readings among them.
+    /// Messages in the new file, with readings.
     pub messages: u64,
-    /// True for an old file with a complete end.
+    /// True if the old file has a complete end.
     pub was_whole: bool,
-    /// Fault due to which the new file has no locator.
+    /// Fault that prevents a locator.
     pub locator_fault: Option<String>,
-    /// Parts of the old file that are not in the new one.
+    /// Lost parts of the old file.
     pub passed_over: PassedOver,
 }
 
-/// Writes all readable messages of a recording into another file, which appears when it is complete.
+/// Copies the readable messages of a recording into a new file.
 ///
 /// # Errors
-/// [`RecordingError`] for a file that is not a recording of palpate, or one that cannot be written.
+/// Not a recording, or a failed write.
 pub fn recover(from: &Path, to: &Path) -> Result<Recovery, RecordingError> {
     let mut playback = Playback::open(from)?;
     let mut recovery = None;
@@ -47,7 +47,6 @@ fn io_error(error: CopyError) -> std::io::Error {
     }
 }
 
-/// Failure to copy messages.
 #[derive(Debug, thiserror::Error)]
 enum CopyError {
     #[error(transparent)]

@@ -1,4 +1,4 @@
-//! A sink that records on demand.
+//! Recording on demand.
 
 use super::head::Subject;
 use super::recorder::{Recorder, RecordingStatus};
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A sink that begins and ends recordings during a session. Clones share their state.
+/// Sink that starts and ends recordings; clones share their state.
 #[derive(Clone, Debug)]
 pub struct RecordingSwitch {
     subject: Arc<Subject>,
@@ -20,11 +20,10 @@ pub struct RecordingSwitch {
 }
 
 impl RecordingSwitch {
-    /// A switch that is off, for a session with this locator and estimation. `source` is the URL in the head of the recordings. Problems are reported
-    /// to the session through `reports`.
+    /// Creates a switch; `reports` receives problems.
     ///
     /// # Errors
-    /// [`RecordingError::Encode`] for a locator that cannot be written as a file.
+    /// [`RecordingError::Encode`].
     pub fn new(
         locator: &Locator,
         estimation: Estimation,
@@ -35,7 +34,7 @@ impl RecordingSwitch {
         Ok(Self { subject, reports, recorder: Arc::default() })
     }
 
-    /// Head of the recordings: version, source, channels.
+    /// Head of the recordings.
     pub fn head(&self) -> &Head {
         &self.subject.head
     }
@@ -43,7 +42,7 @@ impl RecordingSwitch {
     /// Begins a recording in a new file.
     ///
     /// # Errors
-    /// [`RecordingError`] while another recording is active, or for a file that exists already or cannot be made.
+    /// An active recording, or an existing or unwritable file.
     pub fn begin(&self, path: &Path) -> Result<RecordingStatus, RecordingError> {
         let mut recorder = self.recorder();
         if let Some(recorder) = &*recorder {
@@ -55,11 +54,10 @@ impl RecordingSwitch {
         Ok(status)
     }
 
-    /// Begins a recording in a folder, which is made if it is missing. The default name is the time `unix_s`. The name gets a number if the recording
-    /// exists already.
+    /// Begins a recording with a unique name in a folder, which is created.
     ///
     /// # Errors
-    /// [`RecordingError`] for a name that a recording cannot have, and as for [`Self::begin`].
+    /// An invalid name, and as for [`Self::begin`].
     pub fn begin_in(
         &self,
         folder: &Path,
@@ -86,14 +84,14 @@ impl RecordingSwitch {
         }
     }
 
-    /// Ends the recording, and waits until its file is complete; `None` without an active recording.
+    /// Ends the recording, and waits for its file.
     pub fn end(&self) -> Option<RecordingStatus> {
-        // The lock is released before the wait: the session continues.
+        // The lock is released before the wait, so that the session continues.
         let recorder = self.recorder().take();
         recorder.map(Recorder::finish)
     }
 
-    /// State of the active recording.
+    /// Status of the active recording.
     pub fn status(&self) -> Option<RecordingStatus> {
         self.recorder().as_ref().map(Recorder::status)
     }
@@ -111,10 +109,10 @@ impl Sink for RecordingSwitch {
     }
 }
 
-/// Checks an untrusted name: it must name a file directly in its folder.
+/// Checks that an untrusted name stays in its folder.
 ///
 /// # Errors
-/// [`RecordingError::Name`] for any other name.
+/// [`RecordingError::Name`].
 pub fn check_name(name: &str) -> Result<&str, RecordingError> {
     let is_letter = |letter: char| letter.is_ascii_alphanumeric() || "._-".contains(letter);
     let is_name =
@@ -122,7 +120,7 @@ pub fn check_name(name: &str) -> Result<&str, RecordingError> {
     if is_name { Ok(name) } else { Err(RecordingError::Name { name: name.to_owned() }) }
 }
 
-/// A time in the form for file names: `2026-11-24T20-14-24Z`.
+/// A time such as `2026-11-24T20-14-24Z`.
 fn utc(unix_s: u64) -> String {
     let (days, second) = (unix_s / 86_400, unix_s % 86_400);
     // Civil date of a day since 1970-01-01, in eras of 400 years that begin in March.

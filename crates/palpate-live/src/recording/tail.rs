@@ -1,27 +1,20 @@
-//! End of a growing file: bytes that could not be written yet are kept, and written as soon as the disk has room.
+//! Appended file with a buffer for a full disk.
 
 use super::RecordingError;
 use std::fs::{File, Metadata};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-/// A file that is only appended to.
 #[derive(Debug)]
 pub struct Tail {
     file: File,
     path: PathBuf,
     identity: Option<(u64, u64)>,
-    /// Bytes in the file.
     written: u64,
-    /// Bytes that are not yet in the file.
     pending: Vec<u8>,
 }
 
 impl Tail {
-    /// Makes a new file.
-    ///
-    /// # Errors
-    /// [`RecordingError`] for a file that exists already, or cannot be made.
     pub fn create(path: &Path) -> Result<Self, RecordingError> {
         let shown = || path.display().to_string();
         let file = File::create_new(path).map_err(|error| match error.kind() {
@@ -32,25 +25,19 @@ impl Tail {
         Ok(Self { file, path: path.to_owned(), identity, written: 0, pending: Vec::new() })
     }
 
-    /// Bytes in the file and pending bytes together.
     pub fn bytes(&self) -> u64 {
         self.written
     }
 
-    /// Bytes that wait for room.
     pub fn waiting(&self) -> usize {
         self.pending.len()
     }
 
-    /// Adds bytes, which [`Self::write`] writes.
     pub fn push(&mut self, bytes: &[u8]) {
         self.pending.extend_from_slice(bytes);
     }
 
-    /// Hands the pending bytes to the operating system. Bytes that it refuses are kept.
-    ///
-    /// # Errors
-    /// The error with which the operating system refused the rest.
+    /// Writes the waiting bytes, and keeps the rest on errors.
     pub fn write(&mut self) -> std::io::Result<()> {
         let mut done = 0;
         let result = loop {
@@ -67,7 +54,7 @@ impl Tail {
         result
     }
 
-    /// False once the name of the file no longer leads to it: the file or its folder was removed.
+    /// False if the file or its folder was removed.
     pub fn is_there(&self) -> bool {
         match std::fs::metadata(&self.path) {
             Ok(found) => self.identity.is_none() || identity(&found) == self.identity,

@@ -1,4 +1,4 @@
-//! Messages of a block of an MCAP file: a chunk, unpacked and checked against its checksum, or messages outside chunks.
+//! Messages of a block of an MCAP file.
 
 use super::whole_record::parse;
 use mcap::McapError;
@@ -6,27 +6,27 @@ use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use std::io::Read;
 
-/// Most bytes of a record, and of an uncompressed chunk.
+/// Most bytes of a record or an uncompressed chunk.
 pub const MOST: u64 = 256 << 20;
 
-/// Fault of a block with unreadable messages.
+/// Fault of an unreadable block.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BlockFault {
-    /// A compression that is not implemented.
+    /// Unknown compression.
     #[error("its compression `{0}` is unknown; known are `lz4`, `zstd` and none")]
     Compression(String),
-    /// The bytes differ from those that were written.
+    /// Wrong checksum.
     #[error("its checksum does not match its bytes")]
     Checksum,
-    /// More bytes than the reader accepts.
+    /// Too many bytes.
     #[error("it has more than {} MiB", MOST >> 20)]
     TooLarge,
-    /// Compressed bytes or records that cannot be decoded.
+    /// Invalid bytes.
     #[error("its bytes are damaged")]
     Damaged,
 }
 
-/// Hands on the records of the chunk with the content `body`. A faulty chunk hands on no records.
+/// Passes on the records of a valid chunk.
 pub fn unpack_chunk(body: &[u8], mut hand_on: impl FnMut(Record)) -> Result<(), BlockFault> {
     let Some(Record::Chunk { header, data }) = parse(op::CHUNK, body) else {
         return Err(BlockFault::Damaged);
@@ -34,13 +34,15 @@ pub fn unpack_chunk(body: &[u8], mut hand_on: impl FnMut(Record)) -> Result<(), 
     if header.uncompressed_size > MOST {
         return Err(BlockFault::TooLarge);
     }
-    // MCAP's reader decodes lz4. For zstd it uses a library in C that takes half a minute to compile; zstd is decoded here instead.
+    // The MCAP reader decodes lz4. For zstd it uses a library in C that takes half a minute to compile; zstd
+    // is decoded here instead.
     let (compression, data) = match header.compression.as_str() {
         "zstd" => ("", unpack_zstd(&data, header.uncompressed_size)?),
         other => (other, data.into_owned()),
     };
-    // A file of one record, the chunk: MCAP's reader of chunks alone allocates any length that a damaged record states. Bytes behind the data of the
-    // chunk are omitted: the reader would count them as the rest of a record that reaches beyond the chunk.
+    // A file of one record, the chunk: the chunk reader of MCAP allocates any length that a damaged record
+    // states. Bytes after the data of the chunk are omitted, because the reader would count them as the rest
+    // of a record beyond the chunk.
     let mut chunk = Vec::with_capacity(data.len() + 64);
     for number in [header.message_start_time, header.message_end_time, header.uncompressed_size] {
         chunk.extend(number.to_le_bytes());
@@ -89,7 +91,7 @@ fn fault_of(error: &McapError) -> BlockFault {
     }
 }
 
-/// Decompresses `packed` with zstd. The result must have `size` bytes.
+/// The result must have `size` bytes.
 fn unpack_zstd(packed: &[u8], size: u64) -> Result<Vec<u8>, BlockFault> {
     let mut decoder = ruzstd::decoding::StreamingDecoder::new(packed).map_err(|_| BlockFault::Damaged)?;
     let mut data = Vec::new();
@@ -98,7 +100,6 @@ fn unpack_zstd(packed: &[u8], size: u64) -> Result<Vec<u8>, BlockFault> {
     if data.len() as u64 == size { Ok(data) } else { Err(BlockFault::Damaged) }
 }
 
-/// Hands on the records of consecutive messages outside chunks.
 pub fn read_loose(mut bytes: &[u8], mut hand_on: impl FnMut(Record)) -> Result<(), BlockFault> {
     while let Some((head, rest)) = bytes.split_first_chunk::<9>() {
         let [kind, length @ ..] = head;

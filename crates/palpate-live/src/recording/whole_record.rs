@@ -1,25 +1,20 @@
-//! Parser of records that checks their inner lengths first.
-//!
-//! MCAP's own parser allocates the stated length before it checks that so many bytes exist: four gigabytes for a record of a hundred bytes.
+//! Parser that checks lengths first, because that of MCAP allocates any stated length.
 
 use mcap::records::{Record, op};
 
-/// A part of a record.
 #[derive(Clone, Copy)]
 enum Part {
-    /// A fixed number of bytes.
     Bytes(usize),
-    /// A length of four bytes, and as many bytes.
+    /// Four bytes of length, and the text.
     Text,
-    /// A length of eight bytes, and as many bytes.
+    /// Eight bytes of length, and the data.
     Long,
-    /// A length of four bytes, and pairs of texts in as many bytes.
+    /// Four bytes of length, and pairs of texts.
     Map,
 }
 
 use Part::{Bytes, Long, Map, Text};
 
-/// Parts of a kind of record; `None` for a kind that the reader does not use.
 fn parts(kind: u8) -> Option<&'static [Part]> {
     match kind {
         op::CHANNEL => Some(&[Bytes(2 + 2), Text, Text, Map]),
@@ -32,7 +27,7 @@ fn parts(kind: u8) -> Option<&'static [Part]> {
     }
 }
 
-/// Parses a record; `None` for a kind that the reader does not use, and for a record with parts that reach beyond its end.
+/// `None` for unused kinds, or invalid lengths.
 pub(super) fn parse(kind: u8, body: &[u8]) -> Option<Record<'_>> {
     let mut rest = body;
     for part in parts(kind)? {
@@ -41,7 +36,6 @@ pub(super) fn parse(kind: u8, body: &[u8]) -> Option<Record<'_>> {
     mcap::parse_record(kind, body).ok()
 }
 
-/// The bytes after a part.
 fn after(part: Part, bytes: &[u8]) -> Option<&[u8]> {
     let past = |head: usize, length: u64| bytes.get(head..)?.get(usize::try_from(length).ok()?..);
     let short = || bytes.first_chunk().copied().map(u32::from_le_bytes);

@@ -1,20 +1,20 @@
-//! The file that stores alarms between runs of the server.
+//! File of alarms.
 
 use palpate_files as whole_file;
 use std::io::{ErrorKind, Result};
 use std::path::{Path, PathBuf};
 
-/// File with the alarms that browsers set.
+/// File of alarms.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AlarmFile(PathBuf);
 
 impl AlarmFile {
-    /// The file beside a locator or a rig: `strip.alarms.toml` beside `strip.json`.
+    /// Returns `strip.alarms.toml` for a locator or rig `strip.json`.
     pub fn beside(path: &Path) -> Self {
         Self(path.with_extension("alarms.toml"))
     }
 
-    /// The file in a folder of recordings: `alarms.toml`.
+    /// Returns `alarms.toml` in a folder.
     pub fn in_folder(folder: &Path) -> Self {
         Self(folder.join("alarms.toml"))
     }
@@ -24,10 +24,10 @@ impl AlarmFile {
         &self.0
     }
 
-    /// The text of the file; empty if the file does not exist.
+    /// Reads the text; empty without a file.
     ///
     /// # Errors
-    /// The file cannot be read, or is not text.
+    /// Unreadable file or text.
     pub fn read(&self) -> Result<String> {
         match std::fs::read_to_string(&self.0) {
             Err(error) if error.kind() == ErrorKind::NotFound => Ok(String::new()),
@@ -35,10 +35,10 @@ impl AlarmFile {
         }
     }
 
-    /// Writes the whole file; removes it for a text without rules.
+    /// Writes the file, or removes it without rules.
     ///
     /// # Errors
-    /// The folder does not accept the file, or the file cannot be removed.
+    /// Unwritable file.
     pub fn write(&self, text: &str) -> Result<()> {
         if text.trim().is_empty() {
             return match std::fs::remove_file(&self.0) {

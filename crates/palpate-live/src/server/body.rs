@@ -1,4 +1,4 @@
-//! Bodies of requests and answers: JSON, and error messages.
+//! Bodies of requests and answers.
 
 use super::connections::Connection;
 use axum::body::Bytes;
@@ -9,7 +9,7 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// An error answer: the problem, and the remedy.
+/// Error answer: problem and remedy.
 #[derive(Debug)]
 pub struct Refusal {
     status: StatusCode,
@@ -19,12 +19,11 @@ pub struct Refusal {
 }
 
 impl Refusal {
-    /// A refusal with its status.
     pub fn new(status: StatusCode, error: impl Into<String>, help: &'static str) -> Self {
         Self { status, error: error.into(), help, field: None }
     }
 
-    /// Adds the name of the form field that must be corrected.
+    /// Sets the form field to be corrected.
     pub fn with_field(self, field: Option<&'static str>) -> Self {
         Self { field, ..self }
     }
@@ -40,7 +39,7 @@ impl IntoResponse for Refusal {
     }
 }
 
-/// An answer with JSON.
+/// JSON answer.
 pub struct JsonAnswer<T>(pub T);
 
 impl<T: Serialize> IntoResponse for JsonAnswer<T> {
@@ -52,7 +51,6 @@ impl<T: Serialize> IntoResponse for JsonAnswer<T> {
     }
 }
 
-/// Reads a body, within the time limit of the connection.
 async fn whole_body<S: Send + Sync>(request: Request, state: &S) -> Result<Bytes, Refusal> {
     let connection = request.extensions().get::<Connection>().cloned();
     let bytes = Bytes::from_request(request, state);
@@ -73,7 +71,7 @@ fn unread(error: &BytesRejection) -> Refusal {
     Refusal::new(error.status(), error.body_text(), "send at most 64 kB of JSON")
 }
 
-/// A body that is a JSON object.
+/// Body with a JSON object.
 pub struct JsonBody<T>(pub T);
 
 impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
@@ -85,7 +83,7 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
             Refusal::new(StatusCode::BAD_REQUEST, error, "docs/reference/server.md describes the body")
         };
         let body = serde_json::from_slice(&bytes).map_err(|error| refused(error.to_string()))?;
-        // serde would read a list of the values as the struct.
+        // serde accepts a list of values as a struct.
         if bytes.trim_ascii_start().first() != Some(&b'{') {
             return Err(refused("the body is not a JSON object".to_owned()));
         }

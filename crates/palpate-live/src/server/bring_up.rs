@@ -1,4 +1,4 @@
-//! A board without a rig: its source, watched until a page makes a rig for it.
+//! Board without a rig.
 
 use super::lock::locked;
 use crate::input::Input;
@@ -12,65 +12,61 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
-/// Largest number of bits a second of a serial port.
 const GREATEST_BAUD: u32 = 20_000_000;
 
-/// Error of a port or a rate that cannot be used.
+/// Error of a board without a rig.
 #[derive(Debug, thiserror::Error)]
 pub enum BringUpError {
-    /// A rig was made already, or the server was started with one.
+    /// A rig exists.
     #[error("this server has a rig already")]
     HasRig,
-    /// Only serial ports have a choice of port and rate.
+    /// The source is not a serial port.
     #[error("the source {from} has no port and no baud rate")]
     NotSerial {
-        /// The source.
+        /// URL of the source.
         from: String,
     },
-    /// The port does not exist.
+    /// Missing port.
     #[error("serial port {port} does not exist")]
     NoPort {
         /// Name.
         port: String,
     },
-    /// The rate is out of range.
+    /// Rate out of range.
     #[error("{baud} baud; a port takes 1 to {GREATEST_BAUD}")]
     Baud {
-        /// The rate.
+        /// Bits a second.
         baud: u32,
     },
-    /// The source cannot be opened.
+    /// Error of the source.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// The thread of the source cannot be started.
+    /// Error of a new thread.
     #[error("no thread for the source: {0}")]
     Thread(#[from] std::io::Error),
 }
 
-/// A serial port of this machine.
+/// Serial port.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PortRecord {
-    /// Path; on Windows the name.
+    /// Path, or name on Windows.
     pub name: String,
-    /// Description of the connected device, if it is known.
     pub device: Option<String>,
 }
 
-/// A board without a rig, as a record of JSON.
+/// JSON record of a board.
 #[derive(Clone, Debug, Serialize)]
 pub struct BringUpRecord {
-    /// Source of the readings, as its URL.
     from: String,
-    /// The serial port and its bits a second; null for other sources.
+    /// Null for other sources.
     port: Option<String>,
     baud: Option<u32>,
-    /// Serial ports of this machine.
     ports: Vec<PortRecord>,
     #[serde(flatten)]
     seen: MonitorRecord,
 }
 
-/// A board without a rig.
+/// Board without a rig.
 pub struct BringUp {
     clock: HostClock,
     state: Mutex<State>,
@@ -81,7 +77,6 @@ struct State {
     watched: Option<Watched>,
 }
 
-/// The source while it is watched.
 struct Watched {
     monitor: Arc<Mutex<Monitor>>,
     inputs: SyncSender<Input>,
@@ -90,21 +85,17 @@ struct Watched {
 }
 
 impl BringUp {
-    /// Watches a source.
-    ///
-    /// # Errors
-    /// [`BringUpError`] if the source cannot be opened.
+    /// Opens the source.
     pub fn begin(from: SourceUrl, folder: &Path, clock: HostClock) -> Result<Self, BringUpError> {
         let watched = Some(Watched::open(&from, folder, clock)?);
         Ok(Self { clock, state: Mutex::new(State { from, watched }) })
     }
 
-    /// Source of the readings.
     pub fn from(&self) -> SourceUrl {
         locked(&self.state).from.clone()
     }
 
-    /// State of the board. Listing the ports may take a while.
+    /// Slow, because it lists the ports.
     pub fn record(&self) -> BringUpRecord {
         let ports = ports();
         let state = locked(&self.state);
@@ -119,10 +110,10 @@ impl BringUp {
         BringUpRecord { from: state.from.to_string(), port, baud, ports, seen }
     }
 
-    /// Opens another serial port of this machine, or the same port at another rate.
+    /// Opens another port or rate.
     ///
     /// # Errors
-    /// [`BringUpError`] if the source is not a serial port, or the port or the rate cannot be used.
+    /// [`BringUpError`] for other sources, or an unusable port or rate.
     pub fn choose(&self, port: Option<&str>, baud: Option<u32>, folder: &Path) -> Result<(), BringUpError> {
         let mut state = locked(&self.state);
         let SourceUrl::Serial { port: old_port, baud: old_baud, columns } = state.from.clone() else {
@@ -130,7 +121,7 @@ impl BringUp {
         };
         let port = match port.map(PathBuf::from) {
             Some(port) if port != old_port => {
-                // A page may open serial ports of this machine, but no other files.
+                // A page may open serial ports only.
                 let is_port = |one: &PortRecord| Path::new(&one.name) == port;
                 if !ports().iter().any(is_port) {
                     return Err(BringUpError::NoPort { port: port.display().to_string() });
@@ -143,7 +134,7 @@ impl BringUp {
         if !(1..=GREATEST_BAUD).contains(&baud) {
             return Err(BringUpError::Baud { baud });
         }
-        // The port must be free before it is opened again.
+        // The port must be free first.
         if let Some(watched) = state.watched.take() {
             watched.end();
         }
@@ -152,7 +143,7 @@ impl BringUp {
         Ok(())
     }
 
-    /// Names of the detected channels, and whether the board provides them.
+    /// Detected channels, and true if the board names them.
     pub fn channels(&self) -> (Vec<String>, bool) {
         let state = locked(&self.state);
         let Some(watched) = &state.watched else { return (Vec::new(), false) };
@@ -160,7 +151,7 @@ impl BringUp {
         (monitor.channel_names(), monitor.is_named())
     }
 
-    /// Ends the source, so that it is free; returns the fault of a source that delivered no reading.
+    /// Closes the source; returns its fault without readings.
     pub fn end(&self) -> Option<String> {
         locked(&self.state).watched.take()?.end()
     }
@@ -181,7 +172,7 @@ impl Watched {
     fn end(self) -> Option<String> {
         let Self { inputs, thread, source, monitor } = self;
         drop(source);
-        // Only a thread that has ended refuses this.
+        // Fails only after the end of the thread.
         let _ = inputs.send(Input::Stop);
         let _ = thread.join();
         locked(&monitor).fault()
@@ -198,7 +189,6 @@ fn watch(inputs: &Receiver<Input>, monitor: &Mutex<Monitor>) {
     }
 }
 
-/// Serial ports of this machine; empty if they cannot be listed.
 fn ports() -> Vec<PortRecord> {
     let ports = serialport::available_ports().unwrap_or_default();
     let record = |port: serialport::SerialPortInfo| PortRecord {

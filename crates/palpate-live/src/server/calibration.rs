@@ -1,4 +1,4 @@
-//! A calibration that a browser guides, and the resulting locator.
+//! Calibration guided by a browser.
 
 use super::lock::locked;
 use super::machine::{Attendance, MachineRecord, MachineState};
@@ -34,10 +34,10 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 
-/// Plan of a calibration: rig, source of the readings, files of the outcome.
+/// Plan of a calibration.
 #[derive(Debug)]
 pub struct CalibrationPlan {
-    /// The rig.
+    /// Rig.
     pub rig: Rig,
     /// Source of the readings.
     pub from: SourceUrl,
@@ -47,123 +47,110 @@ pub struct CalibrationPlan {
     pub out: PathBuf,
     /// Comment of the file of presses.
     pub comment: String,
-    /// Force of every press, if it differs from that of the rig.
+    /// Force, if not that of the rig.
     pub force_n: Option<f64>,
-    /// The machine that presses, from the rig's stage; `None` if a person presses.
+    /// Machine, if one presses.
     pub machine: Option<StageUrl>,
-    /// Rows that the file of presses already contains.
+    /// Rows on disk.
     pub before: Vec<Row>,
-    /// Statements of the operator so far, completed by the rig and the file of presses.
+    /// Statements of the operator.
     pub statements: Statements,
     /// Seed of the fit.
     pub seed: u64,
 }
 
 impl CalibrationPlan {
-    /// Name of the locator's file.
+    /// File name of the locator.
     pub fn out_name(&self) -> String {
         self.out.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
     }
 
-    /// The machine that presses, and the rig's stage.
     fn machine(&self) -> Option<(&StageUrl, &Stage)> {
         self.machine.as_ref().zip(self.rig.stage.as_ref())
     }
 
-    /// Presses of the plan that are not among these rows.
     fn to_come(&self, statements: &Statements, rows: &[Row]) -> Result<Vec<Press>, PlanError> {
         plan(&self.rig, statements.weights(self.force_n), self.depths_m(), rows)
     }
 
-    /// Depths of the presses; empty if a person presses.
     fn depths_m(&self) -> &[f64] {
         self.machine().map_or(&[], |(_, stage)| &stage.depths_m)
     }
 
-    /// The comment of a file of presses.
     fn comment(&self, statements: &Statements) -> String {
         comment_with_placement(&self.comment, statements.placement_sd_m)
     }
 }
 
-/// Error of a calibration step that cannot be done.
+/// Error of a calibration step.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibratorError {
-    /// The calibration is running already.
+    /// Another step is in progress.
     #[error("the calibration runs already")]
     GoesOn,
-    /// The calibration has not begun, or has ended.
+    /// No calibration in progress.
     #[error("the calibration has not begun, or has ended")]
     NotBegun,
-    /// A machine presses, so that presses cannot be taken back or left out by hand.
+    /// A machine presses.
     #[error("a machine presses: end it first, then remove or skip presses by hand")]
     MachinePresses,
-    /// No machine runs that could be stopped.
+    /// No machine.
     #[error("no machine runs")]
     NoMachine,
-    /// No machine is connected for set-up, which a jog or a touch-off needs.
+    /// No set-up in progress.
     #[error("the machine is not connected for a jog or a touch-off")]
     NotSetUp,
-    /// The jog is too long, or its length is 0.
+    /// Invalid length of a jog.
     #[error("a jog moves one axis by at most {} mm, and not by 0", LONGEST_JOG_M * 1e3)]
     Jog,
-    /// No press was taken that could be fitted, or taken back.
+    /// No press.
     #[error("no press is recorded yet")]
     NoPress,
-    /// The press to be struck out does not exist.
+    /// Missing press.
     #[error("press {press} does not exist; {presses} were recorded")]
     NoSuchPress {
         /// Number, from 1.
         press: usize,
-        /// Presses that were taken.
+        /// Number of presses.
         presses: usize,
     },
-    /// No locator was fitted, or its calibration leaves no fresh place for a check.
+    /// No locator, or no fresh place.
     #[error("no locator was fitted that could be checked")]
     NothingToCheck,
-    /// A statement of the operator is not a valid length or force.
+    /// Statement out of range.
     #[error(transparent)]
     Statement(#[from] OutOfRange),
-    /// The rig does not specify where to press.
+    /// Error of the plan.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// The presses cannot be recorded.
+    /// Error of the recording.
     #[error(transparent)]
     Journal(#[from] JournalError),
-    /// The columns of the source differ from the channels of the rig.
+    /// Wrong columns.
     #[error(transparent)]
     Columns(#[from] ColumnsError),
-    /// The source cannot be opened.
+    /// Error of the source.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// The thread of the calibration cannot be started.
+    /// Error of a new thread.
     #[error("no thread for the calibration: {0}")]
     Thread(#[from] std::io::Error),
 }
 
-/// Phase of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Phase {
-    /// The calibration waits to be started, or to be continued.
     Ready,
-    /// Presses are requested.
     Pressing,
-    /// All presses were taken, or the operator ended the calibration early.
     Pressed,
-    /// The locator is fitted.
     Fitting,
-    /// The locator is in use, and its error is estimated.
     Assessing,
-    /// All is done.
     Done,
-    /// Presses at fresh places are requested, which check the locator.
     Checking,
-    /// A machine is set up: a dry run, jogs, touch-off.
     SettingUp,
 }
 
-/// State of a calibration as a record of JSON.
+/// JSON record of a calibration.
 #[derive(Clone, Debug, Serialize)]
 pub struct CalibrationRecord {
     phase: Phase,
@@ -172,32 +159,24 @@ pub struct CalibrationRecord {
     taken: usize,
     left: usize,
     places: Vec<PlaceRecord>,
-    /// Deviation of the last press from the others of its place, in %.
     last_percent: Option<f64>,
     source: Option<String>,
     readings: u64,
     reading: Vec<f64>,
     bad_frames: u64,
     presses: String,
-    /// Placement, in mm; `None` until it is stated.
     placement_mm: Option<f64>,
-    /// The single weight of all presses, in newtons, if a second one should be requested.
+    /// Single force in newtons, if a second is necessary.
     single_weight_n: Option<f64>,
     problem: Option<String>,
-    /// Reason for requesting a press again, or what a long step waits for.
     hint: Option<String>,
-    /// The machine, if one presses.
     machine: Option<MachineRecord>,
     outcome: Option<OutcomeRecord>,
-    /// The last check of the locator.
     check: Option<CheckRecord>,
-    /// True if the locator can be checked.
     can_check: bool,
-    /// True if a machine can be set up.
     can_set_up: bool,
 }
 
-/// A place of a calibration.
 #[derive(Clone, Debug, Default, Serialize)]
 struct PlaceRecord {
     x_mm: f64,
@@ -210,7 +189,6 @@ struct PlaceRecord {
     spread_percent: Option<f64>,
 }
 
-/// Outcome of a calibration.
 #[derive(Clone, Debug, Serialize)]
 struct OutcomeRecord {
     locator: String,
@@ -223,63 +201,54 @@ struct OutcomeRecord {
     remarks: Vec<String>,
 }
 
-/// A calibration with its state behind a lock.
+/// Calibration behind a lock.
 pub struct Calibrator {
     plan: CalibrationPlan,
-    /// Folder of the paths of sources.
     folder: PathBuf,
     clock: HostClock,
     channels: Vec<Channel>,
     state: Mutex<State>,
-    /// Stop flag of the machine that was started last. It is separate from the state, because the lock of the state may be busy for long.
+    /// Stop flag of the last machine, separate because the state may be locked for long.
     stop: Mutex<Arc<AtomicBool>>,
     attendance: Arc<Attendance>,
 }
 
 struct State {
     phase: Phase,
-    /// Rows of the file of presses, before the calibration begins and after it has ended.
+    /// Rows on disk while no run is active.
     rows: Vec<Row>,
-    /// Trace of each row, and held-out error of each press, where they are known.
+    /// Traces per row, errors per press.
     traces: Vec<Option<Trace>>,
     errors_m: Vec<Option<f64>>,
     statements: Statements,
-    /// Height of the touch that a touch-off found, in metres of the machine.
     touch_z_m: Option<f64>,
     running: Option<Running>,
     problem: Option<String>,
-    /// Outcome of the last set-up.
     hint: Option<String>,
     outcome: Option<OutcomeRecord>,
     check: Option<CheckRecord>,
 }
 
-/// Purpose of the readings of a calibration that runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Purpose {
-    /// Readings are shown before the calibration begins.
     Preview,
-    /// Presses are recorded for the calibration.
     Press,
-    /// Presses at fresh places are recorded for a check.
     Check,
-    /// A machine is set up.
     SetUp,
 }
 
-/// A calibration that runs, with its thread and its source.
 struct Running {
     shared: Arc<Mutex<Shared>>,
     inputs: SyncSender<Input>,
     thread: JoinHandle<()>,
     purpose: Purpose,
     by_machine: bool,
-    /// The thread of the source ends when this is dropped.
+    /// Dropped to end its thread.
     _source: Source,
 }
 
 impl Calibrator {
-    /// A calibration that has not begun. The source may be a path relative to `folder`.
+    /// Creates a calibration; paths of sources are relative to `folder`.
     pub fn new(mut plan: CalibrationPlan, folder: PathBuf, clock: HostClock) -> Self {
         let rows = std::mem::take(&mut plan.before);
         let state = State {
@@ -306,21 +275,19 @@ impl Calibrator {
         }
     }
 
-    /// The plan.
     pub fn plan(&self) -> &CalibrationPlan {
         &self.plan
     }
 
-    /// Signs of people who watch.
     pub fn attendance(&self) -> &Attendance {
         &self.attendance
     }
 
-    /// Begins the calibration with the statements of the operator, or continues one that was ended early. A machine is connected first, and moves
-    /// afterwards. `free_source` ends the session that uses the source.
+    /// Begins or continues the calibration, after connection to a machine. `free_source` ends the session at
+    /// the source.
     ///
     /// # Errors
-    /// [`CalibratorError`] if the calibration is running already, the source cannot be opened, or the presses cannot be recorded.
+    /// [`CalibratorError`] during another step, or of statements, source or recording.
     pub fn begin(&self, stated: Statements, free_source: impl FnOnce()) -> Result<(), CalibratorError> {
         stated.check()?;
         let mut state = self.lock();
@@ -347,11 +314,10 @@ impl Calibrator {
         Ok(())
     }
 
-    /// Connects to the machine, which homes. A dry run (`is_dry_run`) travels over all places at the height of travel, and ends. Nothing is
-    /// recorded.
+    /// Begins the set-up, or a dry run.
     ///
     /// # Errors
-    /// [`CalibratorError`] without a machine, while another step runs, or if the source cannot be opened.
+    /// [`CalibratorError`] without a machine, during another step, or of the source.
     pub fn begin_set_up(&self, is_dry_run: bool, free_source: impl FnOnce()) -> Result<(), CalibratorError> {
         let mut state = self.lock();
         if self.plan.machine().is_none() {
@@ -380,10 +346,10 @@ impl Calibrator {
         is_free && self.plan.machine().is_some()
     }
 
-    /// Gives a task to the machine that is being set up.
+    /// Queues a set-up task.
     ///
     /// # Errors
-    /// [`CalibratorError::NotSetUp`], or [`CalibratorError::Jog`] for a jog that is too long or has length 0.
+    /// [`CalibratorError::NotSetUp`] or `Jog`.
     pub fn ask_set_up(&self, task: SetUpTask) -> Result<(), CalibratorError> {
         if let SetUpTask::Jog(by_m) = &task {
             let is_short = by_m.iter().all(|by_m| by_m.abs() <= LONGEST_JOG_M);
@@ -398,7 +364,6 @@ impl Calibrator {
         Ok(())
     }
 
-    /// A run of the machine, with its tasks if it is set up; `None` if a person presses.
     fn machine_run(&self, state: &State, set_up: Option<Vec<SetUpTask>>) -> Option<MachineRun> {
         let (url, _) = self.plan.machine()?;
         Some(MachineRun {
@@ -411,14 +376,14 @@ impl Calibrator {
         })
     }
 
-    /// The stage of the rig, with the height that a touch-off found.
+    /// Stage with the height from a touch-off.
     fn stage(&self, state: &State) -> Option<Stage> {
         let (_, stage) = self.plan.machine()?;
         let touch_z_m = state.touch_z_m.unwrap_or(stage.touch_z_m);
         Some(Stage { touch_z_m, ..stage.clone() })
     }
 
-    /// Shows readings before the calibration begins, if a person presses and the source can be opened.
+    /// Shows readings to a person.
     pub fn preview(&self) {
         let mut state = self.lock();
         let waits = state.phase == Phase::Ready && state.running.is_none() && state.problem.is_none();
@@ -436,11 +401,10 @@ impl Calibrator {
         }
     }
 
-    /// Asks a person or the machine for presses at fresh places, which check the locator on disk. `free_source` ends the session that uses the
-    /// source.
+    /// Begins presses at fresh places, which check the locator on disk.
     ///
     /// # Errors
-    /// [`CalibratorError`] without a locator to check, or if the source cannot be opened.
+    /// [`CalibratorError`] without a locator, or of the source.
     pub fn begin_check(&self, free_source: impl FnOnce()) -> Result<(), CalibratorError> {
         let mut state = self.lock();
         if !self.can_check(&state) {
@@ -467,8 +431,7 @@ impl Calibrator {
         state.phase == Phase::Done && state.running.is_none()
     }
 
-    /// Ends a check once all its presses are taken or its machine has ended, and measures the error of the locator with them. Returns false if no
-    /// check has come to its end. The session may use the source again afterwards.
+    /// Evaluates a finished check; false without one. The source is then free.
     pub fn finish_check(&self) -> bool {
         let mut state = locked(&self.state);
         let is_over = |running: &Running| {
@@ -504,7 +467,6 @@ impl Calibrator {
         Ok(check.map(|check| CheckRecord::new(&name, &check, statements.placement_sd_m, extent)))
     }
 
-    /// Opens the source, and starts a thread that processes its arrivals.
     fn run(
         &self,
         purpose: Purpose,
@@ -538,10 +500,10 @@ impl Calibrator {
         Ok(Running { shared, inputs, thread, purpose, by_machine, _source: source })
     }
 
-    /// Stops the machine at once, during any move or wait.
+    /// Stops the machine at once.
     ///
     /// # Errors
-    /// [`CalibratorError::NoMachine`] if a person presses.
+    /// [`CalibratorError::NoMachine`].
     pub fn halt(&self) -> Result<(), CalibratorError> {
         if self.plan.machine.is_none() {
             return Err(CalibratorError::NoMachine);
@@ -556,10 +518,10 @@ impl Calibrator {
         stop
     }
 
-    /// Takes back the last press, which is then requested again.
+    /// Requests the last press again.
     ///
     /// # Errors
-    /// [`CalibratorError`] if no press was taken since the calibration began.
+    /// [`CalibratorError`] without a press.
     pub fn redo(&self) -> Result<(), CalibratorError> {
         self.with_hand(|calibration| match calibration.redo()? {
             true => Ok(()),
@@ -567,10 +529,10 @@ impl Calibrator {
         })
     }
 
-    /// Learns the untouched reading again, after the operator has stated that the surface is untouched.
+    /// Learns the baseline again.
     ///
     /// # Errors
-    /// [`CalibratorError::NotBegun`], or [`CalibratorError::MachinePresses`].
+    /// [`CalibratorError::NotBegun`] or `MachinePresses`.
     pub fn relearn_untouched(&self) -> Result<(), CalibratorError> {
         self.with_hand(|calibration| {
             calibration.relearn_untouched();
@@ -578,10 +540,10 @@ impl Calibrator {
         })
     }
 
-    /// Leaves out the next press.
+    /// Skips the next press.
     ///
     /// # Errors
-    /// [`CalibratorError::NotBegun`], or [`CalibratorError::MachinePresses`].
+    /// [`CalibratorError::NotBegun`] or `MachinePresses`.
     pub fn skip(&self) -> Result<(), CalibratorError> {
         self.with_hand(|calibration| {
             calibration.skip();
@@ -589,7 +551,7 @@ impl Calibrator {
         })
     }
 
-    /// Ends the presses, or the set-up, early; a machine lifts its finger first.
+    /// Ends the presses or the set-up early.
     ///
     /// # Errors
     /// [`CalibratorError::NotBegun`].
@@ -603,10 +565,10 @@ impl Calibrator {
         })
     }
 
-    /// Strikes out a press, counted from 1; it is then requested again.
+    /// Deletes a press, counted from 1, and requests it again.
     ///
     /// # Errors
-    /// [`CalibratorError::NoSuchPress`], or another error if a machine presses, a fit or a check runs, or the file cannot be written.
+    /// [`CalibratorError`] without the press, with a machine, during another step, or of the file.
     pub fn strike(&self, press: usize) -> Result<(), CalibratorError> {
         let mut state = self.lock();
         if state.machine_presses() {
@@ -644,7 +606,7 @@ impl Calibrator {
         Ok(())
     }
 
-    /// The presses so far, each with its trace and its agreement with the others.
+    /// Recorded presses.
     pub fn presses(&self) -> Vec<PressRecord> {
         let state = self.lock();
         let extent = self.plan.rig.setup.surface().extent();
@@ -658,7 +620,7 @@ impl Calibrator {
         }
     }
 
-    /// Runs `act` on the calibration of a person. A machine is refused, because it is already on its way to the next press.
+    /// Runs `act` on a person's calibration; a machine is already under way.
     fn with_hand(
         &self,
         act: impl FnOnce(&mut Calibration) -> Result<(), CalibratorError>,
@@ -679,10 +641,10 @@ impl Calibrator {
         act(&mut locked(&running.shared).calibration)
     }
 
-    /// Ends the presses, so that they can be fitted.
+    /// Ends the presses.
     ///
     /// # Errors
-    /// [`CalibratorError::NoPress`], or [`CalibratorError::GoesOn`] if they are being fitted already.
+    /// [`CalibratorError::NoPress`] or `GoesOn`.
     pub fn begin_fit(&self) -> Result<(), CalibratorError> {
         let mut state = self.lock();
         if matches!(state.phase(), Phase::Fitting | Phase::Assessing | Phase::Checking | Phase::SettingUp) {
@@ -700,7 +662,7 @@ impl Calibrator {
         Ok(())
     }
 
-    /// Fits the presses on disk, writes the locator, starts a session with it by `begin`, and assesses it.
+    /// Fits the presses, writes the locator, passes it to `begin`, and assesses it.
     pub fn fit(&self, begin: impl FnOnce(Locator) -> Result<(), String>) {
         let outcome = self.try_to_fit(begin);
         let mut state = self.lock();
@@ -748,8 +710,7 @@ impl Calibrator {
         Ok((outcome, assessment.errors_m))
     }
 
-    /// Ends the calibration if it runs; its presses are on disk. A machine is stopped at once. Returns the fault of a source that delivered no
-    /// reading.
+    /// Ends the calibration, and stops a machine; returns the fault of a source without readings.
     pub fn end(&self) -> Option<String> {
         locked(&self.stop).store(true, Ordering::Relaxed);
         let mut state = self.lock();
@@ -759,7 +720,6 @@ impl Calibrator {
         calibration.fault().filter(|_| calibration.readings() == 0)
     }
 
-    /// State as a record of JSON.
     pub fn record(&self) -> CalibrationRecord {
         let state = self.lock();
         let extent = self.plan.rig.setup.surface().extent();
@@ -816,7 +776,7 @@ impl Calibrator {
         let next = guide.next_press();
         let left = next.map_or(guide.plan().len(), |(number, _)| number);
         let (rows, to_come) = match running.purpose {
-            // Nothing is pressed during set-up: these are the presses of the calibration that follows.
+            // Shows the calibration after the set-up.
             Purpose::SetUp => {
                 let to_come = self.plan.to_come(&state.statements, &state.rows).unwrap_or_default();
                 (state.rows.as_slice(), Cow::Owned(to_come))
@@ -855,7 +815,7 @@ impl Calibrator {
         Some(MachineRecord::new(url, &stage, &places, state.touch_z_m))
     }
 
-    /// The locked state, without a machine's run that has ended. The run of a check remains, because [`Self::finish_check`] ends it.
+    /// Ends a finished run of a machine, except for a check ([`Self::finish_check`]).
     fn lock(&self) -> MutexGuard<'_, State> {
         let mut state = locked(&self.state);
         let has_ended = |running: &Running| {
@@ -869,7 +829,6 @@ impl Calibrator {
 }
 
 impl State {
-    /// The phase; that of the active run, if there is one.
     fn phase(&self) -> Phase {
         let Some(running) = &self.running else { return self.phase };
         match running.purpose {
@@ -884,7 +843,6 @@ impl State {
         }
     }
 
-    /// Stores the statements of the operator; those that are missing in `stated` keep their values.
     fn state(&mut self, stated: Statements) {
         let now = &mut self.statements;
         now.placement_sd_m = stated.placement_sd_m.or(now.placement_sd_m);
@@ -896,14 +854,14 @@ impl State {
         self.running.as_ref().is_some_and(|running| running.by_machine)
     }
 
-    /// Ends the thread and the source, and keeps the rows and the problem.
+    /// Ends the run, but keeps rows and problem.
     fn end_running(&mut self) {
         let Some(Running { shared, inputs, thread, purpose, _source: source, .. }) = self.running.take()
         else {
             return;
         };
         drop(source);
-        // Only a thread that has ended refuses this.
+        // Fails only after the end of the thread.
         let _ = inputs.send(Input::Stop);
         let _ = thread.join();
         let shared = locked(&shared);

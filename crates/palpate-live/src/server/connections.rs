@@ -1,8 +1,7 @@
-//! Connections of the server: the time limits of their requests, and the limit on their number.
+//! Connections of the server, limited in time and number.
 //!
-//! A client that opens connections without sending requests must not block the others, least of all the request that stops a machine. Every request
-//! has a time limit. At the limit on the number of connections, the next one is accepted, and another is closed for it: the oldest that has not
-//! delivered a whole request yet. A WebSocket no longer counts as a connection, because streams have their own limit (`stream.rs`).
+//! Idle clients must not block the stop of a machine: at the limit, a new connection replaces the oldest
+//! incomplete one. Streams (`stream.rs`) have their own limit.
 
 use axum::Router;
 use axum::extract::Request;
@@ -19,18 +18,17 @@ use std::time::Duration;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::task::AbortHandle;
 
-/// Time limit for the head of a request, and for an idle connection between two requests. A head is a packet or two. On a network that carries the
-/// stream they arrive within a second, even if one is lost and sent again.
+/// Time for the head of a request, or for idling. One or two packets arrive within a second, even with a
+/// retransmission.
 const HEAD_WITHIN: Duration = Duration::from_secs(10);
-/// Time limit for the body of a request: at most 64 kB, which take a second at 0.5 Mbit/s.
+/// Time for a body: 64 kB take a second at 0.5 Mbit/s.
 const BODY_WITHIN: Duration = Duration::from_secs(10);
-/// Largest number of simultaneous connections, and of streams. The browsers of a bench need fewer, at six each.
+/// Limit on connections, and on streams; browsers open six each.
 const MOST: usize = 256;
-/// Wait after a connection could not be accepted for lack of file descriptors, until those of the connection that was closed for it are free.
+/// Time for a closed connection to free its files.
 const TAKE_AGAIN: Duration = Duration::from_millis(20);
 
-/// Largest number of simultaneous connections, and of streams in addition. Each is at most a quarter of the process's limit on files, so that
-/// sources, recordings and locators can always open some.
+/// Limit on connections, and on streams: each at most a quarter of the process's file limit.
 pub fn most_open() -> usize {
     (most_files() / 4).clamp(1, MOST)
 }
@@ -47,7 +45,7 @@ fn most_files() -> usize {
     usize::MAX
 }
 
-/// Bounds of connections.
+/// Limits on connections.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
     head_within: Duration,
@@ -61,23 +59,21 @@ impl Default for Bounds {
     }
 }
 
-/// Connection of a request, which carries it as an extension.
+/// Connection, as an extension of its requests.
 #[derive(Clone, Debug)]
 pub struct Connection {
-    /// Time limit for a body.
     pub body_within: Duration,
-    /// True once a whole request has arrived on this connection.
     has_asked: Arc<AtomicBool>,
 }
 
 impl Connection {
-    /// Notes that a request has come to the end of its body.
+    /// Notes a complete request.
     pub fn note_whole_request(&self) {
         self.has_asked.store(true, Ordering::Relaxed);
     }
 }
 
-/// Accepts connections and answers their requests, for ever.
+/// Serves connections forever.
 pub async fn serve(listener: TcpListener, router: Router, bounds: Bounds) -> Infallible {
     let mut open = Open::default();
     loop {
@@ -85,12 +81,13 @@ pub async fn serve(listener: TcpListener, router: Router, bounds: Bounds) -> Inf
             Ok((stream, _)) => {
                 open.make_room(bounds.most);
                 open.take(stream, router.clone(), bounds);
-                // This connection is read before the next one is accepted. Otherwise many simultaneous connections could close it unread.
+                // Reads this connection before the next accept; many simultaneous ones could otherwise close
+                // it unread.
                 tokio::task::yield_now().await;
             }
-            // The other end closed the connection before it was accepted.
+            // Closed by the client.
             Err(error) if is_of_the_other_end(error.kind()) => {}
-            // An immediate retry would fail again, in an endless busy loop.
+            // An immediate retry would be a busy loop.
             Err(_) => {
                 open.close_one();
                 tokio::time::sleep(TAKE_AGAIN).await;
@@ -108,7 +105,6 @@ fn is_of_the_other_end(kind: ErrorKind) -> bool {
 struct Open(Vec<(AbortHandle, Connection)>);
 
 impl Open {
-    /// Removes connections that have ended, and closes one if `most` are active.
     fn make_room(&mut self, most: usize) {
         self.0.retain(|(task, _)| !task.is_finished());
         if self.0.len() >= most {
@@ -116,7 +112,7 @@ impl Open {
         }
     }
 
-    /// Closes the oldest connection that has not delivered a whole request; if all have, the oldest one.
+    /// Closes the oldest incomplete connection, or else the oldest.
     fn close_one(&mut self) {
         let asks = |(_, connection): &(_, Connection)| !connection.has_asked.load(Ordering::Relaxed);
         let oldest = self.0.iter().position(asks).unwrap_or(0);
@@ -126,7 +122,7 @@ impl Open {
     }
 
     fn take(&mut self, stream: TcpStream, router: Router, bounds: Bounds) {
-        // A message leaves at once, without waiting for the acknowledgement of the previous one.
+        // Does not wait for acknowledgements.
         let _ = stream.set_nodelay(true);
         let connection =
             Connection { body_within: bounds.body_within, has_asked: Arc::new(AtomicBool::new(false)) };
@@ -135,7 +131,7 @@ impl Open {
     }
 }
 
-/// Answers the requests of a connection, until it is closed or becomes a WebSocket.
+/// Serves a connection until a WebSocket or the end.
 async fn answer(stream: TcpStream, router: Router, head_within: Duration, connection: Connection) {
     let router = TowerToHyperService::new(router);
     let service = service_fn(move |mut request: Request<Incoming>| {
@@ -147,7 +143,7 @@ async fn answer(stream: TcpStream, router: Router, head_within: Duration, connec
     });
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new()).header_read_timeout(head_within);
-    // An error that ends a connection has no recipient.
+    // The recipient of the error is gone.
     let _ = http.serve_connection(TokioIo::new(stream), service).with_upgrades().await;
 }
 
@@ -163,7 +159,6 @@ mod tests {
 
     const GET: &str = "GET / HTTP/1.1\r\nHost: here\r\n\r\n";
 
-    /// A server with these bounds in a thread that ends with the test, and its address.
     fn served(bounds: Bounds) -> SocketAddr {
         let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         listener.set_nonblocking(true).unwrap();
@@ -191,10 +186,9 @@ mod tests {
         stream
     }
 
-    /// Bytes that arrive until the connection is closed, and the time until then.
     fn until_closed(mut stream: std::net::TcpStream) -> (String, Duration) {
         let (start, mut answer) = (Instant::now(), Vec::new());
-        // A connection that is closed with unread bytes is reset.
+        // Unread bytes cause a reset.
         let ended = stream.read_to_end(&mut answer);
         assert!(ended.is_ok() || start.elapsed() < Duration::from_secs(9), "it is still open");
         (String::from_utf8(answer).unwrap(), start.elapsed())
@@ -207,7 +201,7 @@ mod tests {
             ("", ""),
             ("GET / HTTP/1.1\r\nHost:", ""),
             ("POST /body HTTP/1.1\r\nHost: here\r\nContent-Length: 9\r\n\r\n[1,", "HTTP/1.1 408"),
-            // An idle connection after an answered request.
+            // Idle after an answered request.
             (GET, "HTTP/1.1 200"),
         ] {
             let (told, elapsed) = until_closed(asked(address, request));
@@ -232,7 +226,7 @@ mod tests {
         let mut fifth = asked(address, GET);
         whole(&mut fifth).unwrap();
         assert_eq!(until_closed(third).0, "");
-        // All connections have delivered a request: the oldest is closed.
+        // All are complete: the oldest is closed.
         let mut sixth = asked(address, GET);
         whole(&mut sixth).unwrap();
         until_closed(first);

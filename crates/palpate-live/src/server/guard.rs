@@ -1,4 +1,4 @@
-//! Guard of the server: permissions of requests.
+//! Guard: access control.
 
 use super::body::Refusal;
 use super::lock::locked;
@@ -10,15 +10,12 @@ use std::net::{IpAddr, SocketAddr};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// Shortest token.
 const SHORTEST_TOKEN: usize = 16;
-/// Limit on requests with an effect, a second, of all browsers together.
 const POSTS_A_SECOND: u32 = 50;
 
-/// Path of the request that stops a machine; the limit on requests does not apply to it.
+/// Stop of a machine, exempt from the limit on posts.
 pub const EMERGENCY_STOP: &str = "/api/emergency-stop";
 
-/// Headers of every answer.
 const HEADERS: [(HeaderName, &str); 5] = [
     (
         header::CONTENT_SECURITY_POLICY,
@@ -30,26 +27,26 @@ const HEADERS: [(HeaderName, &str); 5] = [
     (header::CACHE_CONTROL, "no-cache"),
 ];
 
-/// Error of a forbidden access.
+/// Error of an access configuration.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AccessError {
-    /// The address is reachable from other machines, and the token is missing.
+    /// A reachable address needs a token.
     #[error("{address} can be reached from other machines, but no token is set")]
     NoToken {
         /// The address.
         address: IpAddr,
     },
-    /// The token is too short, or contains other characters.
+    /// Invalid token.
     #[error(
         "the token has {length} characters; it must have at least {SHORTEST_TOKEN}, each a letter, a digit, `-`, `.`, `_` or `~`"
     )]
     Token {
-        /// Length.
+        /// Number of characters.
         length: usize,
     },
 }
 
-/// Permissions of a server.
+/// Access permissions of a server.
 #[derive(Clone, Debug, Default)]
 pub struct Access {
     token: Option<String>,
@@ -58,11 +55,10 @@ pub struct Access {
 }
 
 impl Access {
-    /// Access at an address: anybody on this machine has access, elsewhere a client with the token. `host_names` are names by which a browser may
-    /// call this machine, in addition to its address.
+    /// Creates the permissions at an address. `host_names` are further names of this machine.
     ///
     /// # Errors
-    /// [`AccessError`] for a token that is too short, or a reachable address without a token.
+    /// [`AccessError`] for an invalid token, or a reachable address without one.
     pub fn new(
         address: SocketAddr,
         token: Option<String>,
@@ -78,7 +74,6 @@ impl Access {
         }
     }
 
-    /// Sets the address that the server listens at.
     pub(super) fn listening_at(self, address: IpAddr) -> Self {
         Self { address: Some(address), ..self }
     }
@@ -120,14 +115,14 @@ impl Access {
         }
     }
 
-    /// True for a name of this server. A foreign page with a name that was made to resolve to this address sends that name, which is refused.
+    /// True for a name of this server; prevents DNS rebinding.
     fn is_own(&self, host: &str) -> bool {
         let name = match host.strip_prefix('[') {
             Some(rest) => rest.split(']').next().unwrap_or_default(),
             None => host.split(':').next().unwrap_or_default(),
         };
         if let Ok(address) = name.parse::<IpAddr>() {
-            // A server at 0.0.0.0 has all addresses of the machine.
+            // 0.0.0.0 includes all addresses.
             let own = self.address.is_some_and(|own| own == address || own.is_unspecified());
             return own || address.is_loopback();
         }
@@ -136,7 +131,7 @@ impl Access {
     }
 }
 
-/// Refuses a request with two headers of a kind that decides on access, because proxies and this server may use different ones.
+/// Refuses repeated headers, which a proxy may interpret differently.
 fn check_single(headers: &HeaderMap) -> Result<(), Refusal> {
     let decisive = [header::HOST, header::ORIGIN, header::AUTHORIZATION];
     match decisive.iter().find(|name| headers.get_all(*name).iter().count() > 1) {
@@ -153,7 +148,6 @@ fn text(headers: &HeaderMap, name: HeaderName) -> Option<&str> {
     headers.get(name).map(|value| value.to_str().unwrap_or("?"))
 }
 
-/// The token of a request.
 fn given(request: &Request) -> Option<&str> {
     let bearer =
         text(request.headers(), header::AUTHORIZATION).and_then(|value| value.strip_prefix("Bearer "));
@@ -161,7 +155,7 @@ fn given(request: &Request) -> Option<&str> {
     bearer.or_else(|| query.split('&').find_map(|pair| pair.strip_prefix("token=")))
 }
 
-/// Equality in a time that is independent of the first difference.
+/// Constant-time equality.
 fn equal(given: &[u8], token: &[u8]) -> bool {
     let differ = given.iter().zip(token).fold(0, |differ, (a, b)| differ | (a ^ b));
     given.len() == token.len() && std::hint::black_box(differ) == 0
@@ -171,12 +165,11 @@ fn equal(given: &[u8], token: &[u8]) -> bool {
 #[derive(Debug)]
 pub struct Guard {
     access: Access,
-    /// Start of the present second, and the number of posts in it.
+    /// Present second, and its posts.
     posts: Mutex<(Instant, u32)>,
 }
 
 impl Guard {
-    /// A guard with these permissions.
     pub fn new(access: Access) -> Self {
         Self { access, posts: Mutex::new((Instant::now(), 0)) }
     }
@@ -199,9 +192,9 @@ impl Guard {
     }
 }
 
-/// Passes a permitted request on, and adds the headers to every answer.
+/// Answers a permitted request, with security headers.
 pub async fn guarded(State(guard): State<Arc<Guard>>, request: Request, next: Next) -> Response {
-    // The parts of the page have no token in their addresses, and contain no data of the session.
+    // Parts of the page have addresses without a token, and no session data.
     let mut response = match guard.check_for(&request) {
         Ok(()) => next.run(request).await,
         Err(refusal) => refusal.into_response(),

@@ -1,4 +1,4 @@
-//! A locator in live use: the session that runs, and the start of another.
+//! Live use of a locator.
 
 use super::alarm_file::AlarmFile;
 use super::bring_up::{BringUp, BringUpError, BringUpRecord};
@@ -25,131 +25,121 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, OnceLock};
 use std::thread::JoinHandle;
 
-/// A locator in live use.
+/// Live use of a locator.
 pub struct Live {
-    /// Replaced once, when a calibration ends with a locator.
+    /// Replaced once, after a calibration.
     subject: Mutex<Arc<Subject>>,
-    /// Set from the start, or once a rig was made for a board without one.
+    /// Set at the start, or with a new rig.
     calibrator: OnceLock<Calibrator>,
-    /// A board without a rig.
     bring_up: Option<BringUp>,
     simulated: Option<(Rig, BoardConfig)>,
-    /// Folder that paths in URLs of sources are relative to.
     folder: PathBuf,
-    /// Folder of recordings; `None` if sessions are not recorded.
+    /// Folder of recordings; `None` without recording.
     recordings: Option<PathBuf>,
-    /// Configuration of the sessions.
     config: SessionConfig,
-    /// Rules that send commands to the board.
     commands: Rules,
-    /// Rules that raise alarms, set by browsers.
     alarms: Alarms,
-    /// Text of these rules as it was set, and the file that stores it.
     alarm_text: Mutex<(String, Option<AlarmFile>)>,
-    /// Sinks of each session, in addition to browsers and recordings.
     sinks: Vec<OpenSink>,
     clock: HostClock,
     hub: Hub,
     running: Mutex<Option<Running>>,
 }
 
-/// The locator of the sessions, and its description.
 struct Subject {
-    /// `None` before a calibration has ended.
+    /// `None` during a calibration.
     locator: Option<Arc<Locator>>,
     channels: Vec<Channel>,
     info: SessionInfo,
 }
 
-/// A session that runs.
 struct Running {
     url: String,
     inputs: SyncSender<Input>,
-    /// Returns the fault of a source that delivered no reading.
     thread: JoinHandle<Option<String>>,
     switch: RecordingSwitch,
-    /// The thread of the source ends when this is dropped.
+    /// Dropped to end its thread.
     _source: Source,
 }
 
-/// Error of a request that cannot be done.
+/// Error of a request.
 #[derive(Debug, thiserror::Error)]
 pub enum LiveError {
-    /// The calibration has not produced a locator yet.
+    /// No locator yet.
     #[error("the locator does not exist yet: the calibration has not ended")]
     NoLocator,
-    /// The server has no calibration.
+    /// No calibration.
     #[error("this server does not calibrate")]
     NotCalibrating,
-    /// A step of a calibration cannot be done.
+    /// Error of a calibration step.
     #[error(transparent)]
     Calibrator(#[from] CalibratorError),
-    /// No session runs.
+    /// No running session.
     #[error("no session runs: the source is missing or has ended")]
     NoSession,
-    /// The session cannot keep up with its source.
+    /// The session is too slow.
     #[error("the session is behind its source")]
     Behind,
-    /// The server has no rig to simulate.
+    /// No rig to simulate.
     #[error("the server has no simulated board: it was started with a locator alone")]
     NotSimulated,
-    /// The source belongs to the calibration.
+    /// The calibration needs its source.
     #[error("this server calibrates, and its readings come from {from}")]
     Calibrates {
-        /// The source, as its URL.
+        /// URL of the source.
         from: String,
     },
-    /// The source cannot be opened.
+    /// Error of the source.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// The thread of the session cannot be started.
+    /// Error of a new thread.
     #[error("no thread for the session: {0}")]
     Thread(#[from] std::io::Error),
-    /// The configuration of the session does not suit this locator.
+    /// Session configuration unsuitable for the locator.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// The times of the source's readings do not suit the filter or the tracker.
+    /// Times unsuitable for filter or tracker.
     #[error(transparent)]
     Pace(#[from] PaceError),
-    /// The source accepts no commands, and some rules send commands.
+    /// Commands to a one-way source.
     #[error("rules send commands, and {0}")]
     OneWay(#[from] SendError),
-    /// The columns of a source differ from the channels of the locator.
+    /// Wrong columns of the source.
     #[error(transparent)]
     Columns(#[from] ColumnsError),
-    /// A board without a rig cannot be watched.
+    /// Error of a board without a rig.
     #[error(transparent)]
     BringUp(#[from] BringUpError),
-    /// No rig can be made.
+    /// Error of a new rig.
     #[error(transparent)]
     RigForm(#[from] RigFormError),
-    /// Alarms cannot be set.
+    /// Invalid alarms.
     #[error("{0}")]
     Rule(String),
-    /// The alarms cannot be saved.
+    /// Unwritable file of alarms.
     #[error("cannot keep the alarms in {path}: {error}")]
     AlarmFile {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// Why.
+        /// Cause.
         error: std::io::Error,
     },
-    /// Sessions are not recorded.
+    /// No folder of recordings.
     #[error("no folder for recordings is set")]
     NoFolder,
-    /// A recording cannot be made or read.
+    /// Error of a recording.
     #[error(transparent)]
     Recording(#[from] RecordingError),
 }
 
 impl Live {
-    /// A locator of this name, without a session. With a rig in `simulated`, browsers may start a session with a simulated board on its bench.
+    /// Creates live use; `simulated` enables the simulated board.
     pub fn new(locator: Locator, name: &str, simulated: Option<(Rig, BoardConfig)>, folder: PathBuf) -> Self {
         let subject = Subject::of_locator(locator, name, simulated.is_some());
         Self::of_subject(subject, simulated, folder)
     }
 
-    /// A rig without a locator, which browsers calibrate first; times come from the clock.
+    /// Creates live use without a locator, for calibration.
     pub fn calibrating(plan: CalibrationPlan, folder: PathBuf, clock: HostClock) -> Self {
         let subject = Subject {
             locator: None,
@@ -157,15 +147,15 @@ impl Live {
             info: SessionInfo::of_setup(&plan.rig.setup),
         };
         let live = Self { clock, ..Self::of_subject(subject, None, folder) };
-        // The cell was empty.
+        // The cell is empty.
         let _ = live.calibrator.set(Calibrator::new(plan, live.folder.clone(), clock));
         live
     }
 
-    /// A board without a rig; browsers watch it and make a rig for it.
+    /// Creates live use of a board without a rig.
     ///
     /// # Errors
-    /// [`LiveError::BringUp`] if the source cannot be opened.
+    /// [`LiveError::BringUp`].
     pub fn bringing_up(from: SourceUrl, folder: PathBuf) -> Result<Self, LiveError> {
         let subject = Subject { locator: None, channels: Vec::new(), info: SessionInfo::without_rig() };
         let live = Self::of_subject(subject, None, folder);
@@ -192,25 +182,25 @@ impl Live {
         }
     }
 
-    /// Sets the folder in which sessions may be recorded.
+    /// Sets the folder of recordings.
     #[must_use]
     pub fn with_recordings(self, folder: PathBuf) -> Self {
         Self { recordings: Some(folder), ..self }
     }
 
-    /// Sets the configuration of sessions. A configuration that does not suit the locator is refused when a session begins.
+    /// Sets the session configuration, checked at the start of a session.
     #[must_use]
     pub fn with_sessions(self, config: SessionConfig) -> Self {
         Self { config, ..self }
     }
 
-    /// Sets rules that send commands to the board of each session.
+    /// Sets rules that send commands to the board.
     #[must_use]
     pub fn with_commands(self, commands: Rules) -> Self {
         Self { commands, ..self }
     }
 
-    /// Adds rules that raise alarms.
+    /// Sets rules that raise alarms.
     #[must_use]
     pub fn with_alarms(self, rules: Rules) -> Self {
         locked(&self.alarm_text).0 = rules.to_toml();
@@ -218,7 +208,7 @@ impl Live {
         self
     }
 
-    /// Stores alarms in a file. `text` and `rules` are its content.
+    /// Sets the file of alarms, and its content.
     #[must_use]
     pub fn with_alarm_file(self, file: AlarmFile, text: String, rules: Rules) -> Self {
         *locked(&self.alarm_text) = (text, Some(file));
@@ -226,17 +216,15 @@ impl Live {
         self
     }
 
-    /// Text of the rules that raise alarms, and the file that stores it.
     pub(super) fn alarm_text(&self) -> (String, Option<AlarmFile>) {
         locked(&self.alarm_text).clone()
     }
 
-    /// Replaces the rules that raise alarms by those in the text of a rule file; a text without rules removes them. If a file stores the alarms, it
-    /// is written before this returns.
+    /// Replaces the alarms, also on disk; empty text removes them.
     ///
     /// # Errors
-    /// [`LiveError::NoLocator`], [`LiveError::AlarmFile`], or [`LiveError::Rule`]. The last is for a text that is not a rule file, a rule with
-    /// another action than an alarm, and a rule that would never act.
+    /// [`LiveError::NoLocator`], `AlarmFile`, or `Rule` for invalid text, another action, or a rule without
+    /// effect.
     pub(super) fn set_alarms(&self, text: &str) -> Result<(), LiveError> {
         let subject = self.subject();
         let locator = subject.locator.as_ref().ok_or(LiveError::NoLocator)?;
@@ -256,17 +244,16 @@ impl Live {
         Ok(())
     }
 
-    /// Sets sinks for each session, in addition to browsers and recordings.
+    /// Sets sinks besides browsers and recordings.
     #[must_use]
     pub fn with_sinks(self, sinks: Vec<OpenSink>) -> Self {
         Self { sinks, ..self }
     }
 
-    /// Begins a session with a source; a session that runs is ended.
+    /// Replaces the session.
     ///
     /// # Errors
-    /// [`LiveError`] for a source or a sink that cannot be opened, and for columns that lack a channel. It is also returned for a locator that does
-    /// not suit the configuration of sessions. The session that runs continues in these cases.
+    /// [`LiveError`] of source, sinks, columns or configuration; the running session then continues.
     pub fn begin(&self, url: &SourceUrl) -> Result<(), LiveError> {
         pipeline::check_pace(&self.config.estimation, url)?;
         self.begin_with(url.to_string(), url.columns(), |clock, to| {
@@ -274,17 +261,17 @@ impl Live {
         })
     }
 
-    /// Begins a session with the simulated board; a session that runs is ended.
+    /// Replaces the session by a simulated one.
     ///
     /// # Errors
-    /// [`LiveError::Calibrates`], [`LiveError::NotSimulated`] without a rig, and the errors of [`Self::begin`].
+    /// [`LiveError::Calibrates`], `NotSimulated`, or those of [`Self::begin`].
     pub fn begin_simulated(&self) -> Result<(), LiveError> {
         self.check_source_is_free()?;
         let (rig, config) = self.simulated.clone().ok_or(LiveError::NotSimulated)?;
         self.begin_with("simulated".to_owned(), &[], |clock, to| Source::simulated(rig, config, clock, to))
     }
 
-    /// Refuses a new source if the server has a calibration, which needs its own source.
+    /// A calibration needs its own source.
     pub(super) fn check_source_is_free(&self) -> Result<(), LiveError> {
         match self.calibrator.get() {
             Some(calibrator) => Err(LiveError::Calibrates { from: calibrator.plan().from.to_string() }),
@@ -317,7 +304,7 @@ impl Live {
             sinks.push(open(&channels, extent, inputs.clone())?);
         }
         sinks.extend(commands.map(|commands| Box::new(commands) as Box<dyn Sink>));
-        // Everything that may fail has been opened, so that the running session can be ended now.
+        // All fallible steps are done; the running session may end.
         let mut running = self.lock();
         if let Some(running) = running.take() {
             running.end();
@@ -335,10 +322,10 @@ impl Live {
         Ok(())
     }
 
-    /// Passes a user's command to the session.
+    /// Sends a command to the session.
     ///
     /// # Errors
-    /// [`LiveError::NoSession`] or [`LiveError::Behind`].
+    /// [`LiveError::NoSession`] or `Behind`.
     pub fn command(&self, command: Command) -> Result<(), LiveError> {
         use std::sync::mpsc::TrySendError;
         let running = self.lock();
@@ -349,17 +336,17 @@ impl Live {
         })
     }
 
-    /// Begins a recording of the session, under the given name or one made from the time.
+    /// Begins a recording, named by the time by default.
     ///
     /// # Errors
-    /// [`LiveError::NoFolder`], [`LiveError::NoSession`], or [`LiveError::Recording`] if a recording is running or its file cannot be made.
+    /// [`LiveError::NoFolder`], `NoSession`, or `Recording`.
     pub fn begin_recording(&self, name: Option<&str>) -> Result<RecordingStatus, LiveError> {
         let folder = self.recordings()?;
         let switch = self.switch().ok_or(LiveError::NoSession)?;
         Ok(switch.begin_in(folder, name, self.clock.now().unix_ns / 1_000_000_000)?)
     }
 
-    /// Ends the recording of the session, and waits until its file is complete; `None` if no recording is running.
+    /// Ends the recording after its last byte.
     ///
     /// # Errors
     /// [`LiveError::NoSession`].
@@ -367,18 +354,18 @@ impl Live {
         Ok(self.switch().ok_or(LiveError::NoSession)?.end())
     }
 
-    /// Recordings in the folder, as listed by [`recording::list`].
+    /// Lists recordings; see [`recording::list`].
     ///
     /// # Errors
-    /// [`LiveError::NoFolder`], or [`LiveError::Recording`] for a folder that cannot be read.
+    /// [`LiveError::NoFolder`] or `Recording`.
     pub fn list_recordings(&self) -> Result<Vec<RecordingSummary>, LiveError> {
         Ok(recording::list(self.recordings()?)?)
     }
 
-    /// Part of a recording of the folder; see [`recording::read`].
+    /// Reads a recording; see [`recording::read`].
     ///
     /// # Errors
-    /// [`LiveError::NoFolder`], or [`LiveError::Recording`] for a name without a recording, or a file that cannot be read.
+    /// [`LiveError::NoFolder`] or `Recording`.
     pub fn read_recording(
         &self,
         name: &str,
@@ -388,10 +375,10 @@ impl Live {
         Ok(recording::read(&self.recording_path(name)?, from_s, to_s, points)?)
     }
 
-    /// Path of a recording of the folder; the file need not exist.
+    /// Path of a possible recording.
     ///
     /// # Errors
-    /// [`LiveError::NoFolder`], or [`LiveError::Recording`] for a name that no recording can have, or that of a link, a pipe or a folder.
+    /// [`LiveError::NoFolder`], or `Recording` for an invalid name, a link, a pipe or a folder.
     pub fn recording_path(&self, name: &str) -> Result<PathBuf, LiveError> {
         let path = self.recordings()?.join(recording::check_name(name)?);
         match path.symlink_metadata() {
@@ -406,44 +393,34 @@ impl Live {
         self.recordings.as_ref().ok_or(LiveError::NoFolder)
     }
 
-    /// The recording switch of the session that runs.
     fn switch(&self) -> Option<RecordingSwitch> {
         self.lock().as_ref().map(|running| running.switch.clone())
     }
 
-    /// The board without a rig.
     fn board(&self) -> Result<&BringUp, BringUpError> {
         let board = self.bring_up.as_ref().filter(|_| self.calibrator.get().is_none());
         board.ok_or(BringUpError::HasRig)
     }
 
-    /// State of a board without a rig.
-    ///
-    /// # Errors
-    /// [`LiveError::BringUp`] if there is a rig.
     pub(super) fn seen(&self) -> Result<BringUpRecord, LiveError> {
         Ok(self.board()?.record())
     }
 
-    /// Opens another port for a board without a rig.
-    ///
-    /// # Errors
-    /// [`LiveError::BringUp`].
     pub(super) fn choose_port(&self, port: Option<&str>, baud: Option<u32>) -> Result<(), LiveError> {
         Ok(self.board()?.choose(port, baud, &self.folder)?)
     }
 
-    /// Makes a rig for a board without one. Once the rig is written, the server calibrates it.
+    /// Makes a rig; a written one can be calibrated.
     ///
     /// # Errors
-    /// [`LiveError::BringUp`] if there is a rig, and [`LiveError::RigForm`].
+    /// [`LiveError::BringUp`] or `RigForm`.
     pub(super) fn make_rig(&self, form: &RigForm) -> Result<MadeRigRecord, LiveError> {
         let board = self.board()?;
         let mut made = MadeRig::new(form, &board.from(), &board.channels(), &self.folder)?;
         if !form.write {
             return Ok(made.record);
         }
-        // The lock lets one request at a time make the rig.
+        // Only one request at a time makes the rig.
         let mut subject = locked(&self.subject);
         self.board()?;
         made.write(form.overwrite)?;
@@ -466,15 +443,11 @@ impl Live {
             before: Vec::new(),
             seed: 0,
         };
-        // The cell was empty, because the board had no rig.
+        // The cell is empty without a rig.
         let _ = self.calibrator.set(Calibrator::new(plan, self.folder.clone(), self.clock));
         Ok(made.record)
     }
 
-    /// The calibration, if there is one.
-    ///
-    /// # Errors
-    /// [`LiveError::NotCalibrating`].
     pub(super) fn calibration(&self) -> Result<CalibrationRecord, LiveError> {
         let calibrator = self.calibrator()?;
         if calibrator.finish_check() {
@@ -488,46 +461,32 @@ impl Live {
         self.calibrator.get().ok_or(LiveError::NotCalibrating)
     }
 
-    /// Notes that somebody watches who could stop a machine.
     pub(super) fn attend(&self) {
         if let Some(calibrator) = self.calibrator.get() {
             calibrator.attendance().note();
         }
     }
 
-    /// True while a machine needs to be watched.
     pub(super) fn needs_attendance(&self) -> bool {
         self.calibrator.get().is_some_and(|calibrator| calibrator.attendance().is_needed())
     }
 
-    /// Begins the calibration, or continues one that was ended early.
-    ///
-    /// # Errors
-    /// [`LiveError`] if the source cannot be opened, or the presses cannot be recorded.
     pub(super) fn begin_calibration(&self, stated: Statements) -> Result<(), LiveError> {
         Ok(self.calibrator()?.begin(stated, || drop(self.end_session()))?)
     }
 
-    /// Requests presses at fresh places, which check the locator.
-    ///
-    /// # Errors
-    /// [`LiveError`] without a locator to check, or if the source cannot be opened.
     pub(super) fn begin_check(&self) -> Result<(), LiveError> {
         Ok(self.calibrator()?.begin_check(|| drop(self.end_session()))?)
     }
 
-    /// Connects to the machine of the calibration to set it up.
-    ///
-    /// # Errors
-    /// [`LiveError`] without a machine, while another step runs, or if the source cannot be opened.
     pub(super) fn begin_set_up(&self, is_dry_run: bool) -> Result<(), LiveError> {
         Ok(self.calibrator()?.begin_set_up(is_dry_run, || drop(self.end_session()))?)
     }
 
-    /// Fits the presses in a separate thread; a session with the locator begins as soon as the locator exists.
+    /// Fits the presses in a thread, then begins a session.
     ///
     /// # Errors
-    /// [`LiveError`] if no press was taken, or a fit is running already.
+    /// [`LiveError`] without presses, or during a fit.
     pub(super) fn finish_calibration(self: &Arc<Self>) -> Result<(), LiveError> {
         let calibrator = self.calibrator()?;
         calibrator.begin_fit()?;
@@ -545,7 +504,7 @@ impl Live {
         Ok(())
     }
 
-    /// Ends the session and the calibration if they run; returns the fault of a source that delivered no reading.
+    /// Ends session and calibration; returns the fault of a source without readings.
     pub fn end(&self) -> Option<String> {
         let of_calibration = self.calibrator.get().and_then(Calibrator::end);
         let of_board = self.bring_up.as_ref().and_then(BringUp::end);
@@ -557,7 +516,7 @@ impl Live {
         self.lock().take()?.end()
     }
 
-    /// URL of the source, while its session runs.
+    /// URL of the running source.
     pub fn source(&self) -> Option<String> {
         let running = self.lock();
         running.as_ref().filter(|running| !running.thread.is_finished()).map(|running| running.url.clone())
@@ -583,9 +542,8 @@ impl Live {
             .with_bring_up(self.board().is_ok())
     }
 
-    /// The last minutes of the session as a record of JSON.
     pub(super) fn past(&self) -> String {
-        // The session waits for this lock, so that it is released before the text is assembled.
+        // Releases the lock early, because the session waits for it.
         let past = locked(&self.hub.past).clone();
         past.to_json()
     }
@@ -617,7 +575,7 @@ impl Running {
     fn end(self) -> Option<String> {
         let Self { inputs, thread, switch, _source: source, .. } = self;
         drop(source);
-        // Only a session that has ended refuses this.
+        // Fails only after the end of the session.
         let _ = inputs.send(Input::Stop);
         let fault = thread.join().ok().flatten();
         switch.end();

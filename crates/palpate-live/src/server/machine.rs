@@ -1,4 +1,4 @@
-//! The machine of a calibration as browsers see it, and the people who watch it.
+//! Machine of a calibration, and attendance of people.
 
 use crate::calibration::{Calibration, Machine, Motion, Note};
 use crate::stage::{StageUrl, Stopping};
@@ -10,40 +10,37 @@ use serde::Serialize;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Time without a connected page after which a machine lifts its finger and ends.
+/// Time before an unwatched machine lifts its finger and ends.
 pub const UNWATCHED: Duration = Duration::from_secs(5);
 
-/// Attendance of people who can stop a machine: the time of the last signal from a page.
+/// Attendance of people who can stop a machine.
 #[derive(Debug)]
 pub struct Attendance {
     clock: HostClock,
     seen_ms: AtomicU64,
-    /// True while a machine needs to be watched.
     is_needed: AtomicBool,
 }
 
 impl Attendance {
-    /// Attendance without a signal so far. It uses real time at any speed of a simulated machine, because people act in real time.
+    /// Uses real time even for simulated machines, as people do.
     pub fn new() -> Self {
         Self { clock: HostClock::new(), seen_ms: AtomicU64::new(0), is_needed: AtomicBool::new(false) }
     }
 
-    /// Notes a signal of a person.
     pub fn note(&self) {
         self.seen_ms.store(self.now_ms(), Ordering::Relaxed);
     }
 
-    /// True while a machine needs to be watched.
     pub fn is_needed(&self) -> bool {
         self.is_needed.load(Ordering::Relaxed)
     }
 
-    /// Sets whether a machine needs to be watched.
+    /// Sets the need for attendance.
     pub fn set_needed(&self, is_needed: bool) {
         self.is_needed.store(is_needed, Ordering::Relaxed);
     }
 
-    /// True after a long time without a signal of a person.
+    /// True after [`UNWATCHED`] without a signal.
     pub fn is_absent(&self) -> bool {
         self.now_ms().saturating_sub(self.seen_ms.load(Ordering::Relaxed)) > UNWATCHED.as_millis() as u64
     }
@@ -53,7 +50,7 @@ impl Attendance {
     }
 }
 
-/// State of a machine, as visible to other threads.
+/// State of a machine for other threads.
 #[derive(Clone, Debug, Default)]
 pub struct MachineState {
     pub firmware: Option<&'static str>,
@@ -61,18 +58,16 @@ pub struct MachineState {
     pub motion: Option<Motion>,
     position: Option<Position>,
     depth_m: Option<f64>,
-    /// The instant of the first press, the present instant, and the number of presses since then.
+    /// Instants of the first press and now, and presses in between.
     pressing_since: Option<Duration>,
     now: Duration,
     taken: usize,
     pub left_out: usize,
-    /// Position after the last move, and the height of the touch that was found, in metres of the machine.
     at_m: Option<[f64; 3]>,
     pub touch_z_m: Option<f64>,
 }
 
 impl MachineState {
-    /// Updates the state from the motion of the machine and the resulting notes.
     pub fn take(&mut self, now: Duration, machine: &Machine, notes: &[Note]) {
         self.now = now;
         self.motion = Some(machine.motion());
@@ -86,31 +81,28 @@ impl MachineState {
     }
 }
 
-/// A machine as a record of JSON.
+/// JSON record of a machine.
 #[derive(Clone, Debug, Serialize)]
 pub struct MachineRecord {
     url: String,
     firmware: Option<&'static str>,
-    /// The way in which a stop acts, if it is not immediate.
+    /// Effect of a delayed stop.
     stopping: Option<String>,
-    /// True while the machine runs: from the connection until its finger is lifted for good.
+    /// From connection to final lift.
     runs: bool,
-    /// `None` while the connection is established.
+    /// `None` while connecting.
     motion: Option<Motion>,
     x_mm: Option<f64>,
     y_mm: Option<f64>,
     depth_mm: Option<f64>,
-    /// Force at the load cell.
     force_n: Option<f64>,
     left_s: Option<f64>,
-    /// Position after the last move in machine coordinates; `None` before homing, and while it does not run.
     at_mm: Option<[f64; 3]>,
-    /// Height of the touch that a touch-off found.
     found_touch_mm: Option<f64>,
     moves: MovesRecord,
 }
 
-/// Ranges and speeds of a machine, in its own coordinates.
+/// In machine coordinates.
 #[derive(Clone, Debug, Serialize)]
 struct MovesRecord {
     x_mm: (f64, f64),
@@ -125,7 +117,7 @@ struct MovesRecord {
 }
 
 impl MachineRecord {
-    /// A machine that does not run, over places of a surface. `found_touch_m` is the height of the touch, if a touch-off found it.
+    /// Machine at rest; `found_touch_m` is from a touch-off.
     pub fn new(url: &StageUrl, stage: &Stage, places: &[Position], found_touch_m: Option<f64>) -> Self {
         let (from_x_m, from_y_m) = stage.origin_m;
         let span_mm = |at_m: &dyn Fn(Position) -> f64| {
@@ -162,7 +154,7 @@ impl MachineRecord {
         }
     }
 
-    /// The record of a machine that runs with `left` remaining presses.
+    /// Machine in use, with `left` presses.
     pub fn running(
         self,
         state: &MachineState,

@@ -1,7 +1,7 @@
-//! The web server: a page, a stream of the session, and its controls.
+//! Web server: page, stream and controls.
 //!
-//! One thread runs the whole server. A browser costs a task and its place in bounded queues. A slow browser loses the oldest messages, which are
-//! counted, and the session never waits for it.
+//! One thread serves all browsers from bounded queues: a slow browser loses the oldest messages, which are
+//! counted, and never delays the session.
 
 mod alarm_file;
 mod body;
@@ -37,23 +37,23 @@ use std::thread::JoinHandle;
 use tokio::net::TcpListener;
 use tokio::sync::oneshot;
 
-/// A server that cannot be started.
+/// Error of the start of a server.
 #[derive(Debug, thiserror::Error)]
 pub enum ServerError {
-    /// The server cannot listen at the address.
+    /// Failure to listen at the address.
     #[error("cannot listen at {address}: {error}")]
     Listen {
         /// The address.
         address: SocketAddr,
-        /// Why.
+        /// Cause.
         error: std::io::Error,
     },
-    /// The thread or the event queue of the server cannot be created.
+    /// Failure of the thread or the event queue.
     #[error("cannot run a web server: {0}")]
     Run(#[from] std::io::Error),
 }
 
-/// A web server that runs in a thread of its own until it is dropped.
+/// Web server in a thread, until dropped.
 #[derive(Debug)]
 pub struct Server {
     address: SocketAddr,
@@ -62,10 +62,10 @@ pub struct Server {
 }
 
 impl Server {
-    /// Starts a server of a live session at an address; port 0 selects any free port.
+    /// Starts a server; port 0 is any free port.
     ///
     /// # Errors
-    /// [`ServerError`] if the server cannot listen at the address.
+    /// [`ServerError`] of the address.
     pub fn start(address: SocketAddr, access: Access, live: Arc<Live>) -> Result<Self, ServerError> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
         let listener = runtime.block_on(TcpListener::bind(address));
@@ -86,7 +86,7 @@ impl Server {
         Ok(Self { address, stop: Some(stop), thread: Some(thread) })
     }
 
-    /// The address that the server listens at.
+    /// Address of the server.
     pub fn address(&self) -> SocketAddr {
         self.address
     }

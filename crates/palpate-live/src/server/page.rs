@@ -1,16 +1,16 @@
-//! The dashboard's files, if they were built.
+//! Files of the dashboard, if built.
 
 use axum::http::{Method, StatusCode, Uri, header};
 use axum::response::{Html, IntoResponse, Response};
 use rust_embed::RustEmbed;
 
-/// The dashboard, which `cargo xtask web` builds.
+/// Output of `cargo xtask web`.
 #[derive(RustEmbed)]
 #[folder = "$CARGO_MANIFEST_DIR/dashboard"]
 #[allow_missing = true]
 struct Dashboard;
 
-/// A file of the dashboard; if it was not built, a page with instructions to obtain it.
+/// File of the dashboard, or instructions to build it.
 pub async fn page(method: Method, uri: Uri) -> Response {
     let path = match uri.path() {
         "/" => "index.html",

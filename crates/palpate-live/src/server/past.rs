@@ -1,21 +1,18 @@
-//! The last minutes of a session, for browsers that open the page later.
+//! Past of a session, for later browsers.
 
 use crate::event::{Event, EventRecord};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// Seconds of stored samples.
 const KEPT_S: f64 = 600.0;
-/// Stored samples a second.
 const PER_S: f64 = 10.0;
-/// Largest number of samples: as many as fit into the time.
 const MOST_SAMPLES: usize = (KEPT_S * PER_S) as usize;
-/// Largest number of events; moves are not among them.
+/// Limit on events, without moves.
 const MOST_EVENTS: usize = 1000;
-/// Largest number of bytes of the samples as text, a limit that many channels reach first.
+/// Limit on text, for many channels.
 const MOST_BYTES: usize = 16 << 20;
 
-/// Ten samples a second of the last ten minutes, and the last events, each as text of JSON.
+/// Samples of 10 minutes at 10 a second, and last events, as JSON.
 #[derive(Clone, Debug, Default)]
 pub struct Past {
     samples: VecDeque<(f64, Arc<str>)>,
@@ -29,7 +26,6 @@ impl Past {
         self.samples.back().is_none_or(|(last_s, _)| (time_s * PER_S).floor() > (last_s * PER_S).floor())
     }
 
-    /// Stores a sample, and removes the oldest ones beyond the limits.
     pub fn push_sample(&mut self, time_s: f64, text: &str) {
         self.sample_bytes += text.len();
         self.samples.push_back((time_s, Arc::from(text)));
@@ -43,7 +39,6 @@ impl Past {
         }
     }
 
-    /// Stores an event, and removes the oldest one beyond the limit.
     pub fn push_event(&mut self, event: &EventRecord) {
         if matches!(event.event, Event::Move { .. }) {
             return;
@@ -55,7 +50,7 @@ impl Past {
         }
     }
 
-    /// All samples and events as a record of JSON: `samples` and `events`, the oldest first.
+    /// JSON of `samples` and `events`, the oldest first.
     pub fn to_json(&self) -> String {
         let mut json = String::with_capacity(self.sample_bytes + 64);
         json.push_str("{\"samples\":[");
@@ -100,7 +95,7 @@ mod tests {
             "{first_s} to {last_s}"
         );
         assert!((5400..=MOST_SAMPLES).contains(&past.samples.len()), "{}", past.samples.len());
-        // A slower board loses no sample.
+        // A slower board loses no samples.
         assert_eq!(filled(4.0, 100.0).samples.len(), 400);
     }
 

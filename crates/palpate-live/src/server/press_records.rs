@@ -1,4 +1,4 @@
-//! Presses of a calibration and a check of its locator, as records of JSON.
+//! JSON records of presses and checks.
 
 use crate::calibration::{Check, Trace, deviation_percent};
 use palpate_estimators::recording::Row;
@@ -6,7 +6,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use serde::Serialize;
 
-/// A recorded press.
+/// JSON record of a press.
 #[derive(Clone, Debug, Serialize)]
 pub struct PressRecord {
     /// Number, from 1.
@@ -15,15 +15,14 @@ pub struct PressRecord {
     #[serde(skip_serializing_if = "Option::is_none")]
     y_mm: Option<f64>,
     force_n: Option<f64>,
-    /// Deviation from the others at its place and force, in %.
     deviation_percent: Option<f64>,
-    /// Error of a locator that was fitted without the place of the press.
+    /// Error of a locator fitted without this place.
     held_out_mm: Option<f64>,
-    /// Seconds before it was recorded, and the distance from the untouched reading in %.
+    /// Seconds relative to the recording, and relative distance in %.
     trace: Vec<(f64, f64)>,
 }
 
-/// Records of the presses among rows with their traces; `errors_m` contains the errors of the last fit, one per press.
+/// Records of presses; `errors_m` has one value per press.
 pub fn press_records(
     rows: &[Row],
     traces: &[Option<Trace>],
@@ -46,14 +45,13 @@ pub fn press_records(
     touched.enumerate().map(record).collect()
 }
 
-/// A check of the locator at fresh places.
+/// JSON record of a check.
 #[derive(Clone, Debug, Serialize)]
 pub struct CheckRecord {
     presses: String,
     places: Vec<CheckedPlaceRecord>,
     median_mm: f64,
     mean_mm: f64,
-    /// Number of places that the 95 % intervals cover.
     covered: Option<usize>,
     placement_mm: Option<f64>,
 }
@@ -71,7 +69,6 @@ struct CheckedPlaceRecord {
 }
 
 impl CheckRecord {
-    /// The record of a check with its presses in a file of this name.
     pub fn new(presses: &str, check: &Check, placement_sd_m: Option<f64>, extent: Extent) -> Self {
         let places = check.places.iter().map(|place| {
             let (x_mm, y_mm) = place_mm(place.position, extent);

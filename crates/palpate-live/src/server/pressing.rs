@@ -1,4 +1,4 @@
-//! The threads of a calibration in progress: readings for the presses of a person, or of a machine.
+//! Threads of a calibration by a person, or by a machine.
 
 use super::lock::locked;
 use super::machine::{Attendance, UNWATCHED};
@@ -13,12 +13,11 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// Longest time between two checks of the machine and of its stop.
+/// Longest interval between checks of the stop.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Processes the arrivals of the source until a stop arrives.
+/// Processes arrivals until a stop.
 pub fn listen(inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
-    /// Longest wait for an arrival.
     const LOOK: Duration = Duration::from_millis(100);
     loop {
         let arrived = match inputs.recv_timeout(LOOK) {
@@ -33,26 +32,26 @@ pub fn listen(inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
     }
 }
 
-/// A run of a machine, without its readings.
+/// Run of a machine.
 #[derive(Clone, Debug)]
 pub struct MachineRun {
     pub url: StageUrl,
     pub stage: Stage,
-    /// First tasks of a machine that is set up; `None` for one that presses.
+    /// First set-up tasks; `None` for presses.
     pub set_up: Option<Vec<SetUpTask>>,
-    /// Setting this flag stops the machine at any time.
+    /// Flag that stops the machine.
     pub stop: Arc<AtomicBool>,
     pub attendance: Arc<Attendance>,
     pub clock: HostClock,
 }
 
 impl MachineRun {
-    /// Runs the machine until its work is done or it fails; a failure becomes the problem of `shared`.
+    /// Runs the machine; a failure is stored in `shared`.
     pub fn run(self, inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
         self.attendance.note();
         self.attendance.set_needed(true);
         let outcome = self.try_to_run(inputs, shared).map_err(|error| match error {
-            // The machine's thread may react to the stop first.
+            // The machine's thread may react first.
             MachineError::Stage(StageError::Stopped) if self.stop.load(Ordering::Relaxed) => {
                 MachineError::ByHand
             }
@@ -92,7 +91,7 @@ impl MachineRun {
             let arrived = match inputs.recv_timeout(LOOK) {
                 Ok(Input::Arrived(arrived)) => Some(arrived),
                 Ok(Input::Command(_)) | Err(RecvTimeoutError::Timeout) => None,
-                // The server ends.
+                // End of the server.
                 Ok(Input::Stop) | Err(RecvTimeoutError::Disconnected) => return machine.stop_by_hand(),
             };
             if self.stop.load(Ordering::Relaxed) {

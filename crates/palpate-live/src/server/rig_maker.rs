@@ -1,4 +1,4 @@
-//! A first rig for a board, made from a user's form, for a surface without a model.
+//! Rig from a form, without a model of the surface.
 
 use crate::calibration::{PlanError, Statements, Weights, plan};
 use crate::source::{SourceUrl, SourceUrlError};
@@ -9,55 +9,49 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// Largest number of characters of a file name.
 const LONGEST_NAME: usize = 100;
 
-/// Largest number of places of a calibration, and of presses of a place, as in the rig's file.
 const MOST_COUNT: usize = 100_000;
 
-/// Form that a user fills in.
+/// Form of a rig.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RigForm {
-    /// Name of the rig's file, in the folder in which the server was started.
     pub file: String,
-    /// Names of the channels, in the order of the board's values; a channel with an empty name is left out.
+    /// In the order of the board; an empty name excludes a channel.
     pub channels: Vec<String>,
-    /// Length of the surface.
     pub length_mm: f64,
-    /// Width of a surface with two directions.
+    /// Width, for two directions.
     #[serde(default)]
     pub width_mm: Option<f64>,
-    /// Numbers of places to press: along the length and, for two directions, across it.
+    /// Number of places along each direction.
     pub places: Vec<usize>,
-    /// Number of presses of each place.
+    /// Presses of each place.
     pub repeats: usize,
-    /// Force of every press; unknown if it is missing.
+    /// Force, if known.
     #[serde(default)]
     pub force_n: Option<f64>,
-    /// Second force, with which every other place is also pressed.
+    /// Second force, for every other place.
     #[serde(default)]
     pub second_force_n: Option<f64>,
-    /// Distance of the pressed place from the requested one, as a standard deviation.
+    /// Standard deviation of the placement.
     #[serde(default)]
     pub placement_mm: Option<f64>,
-    /// Place of each sensor, in the order of the channels: along the length and, for two directions, across it.
+    /// Place of each sensor.
     #[serde(default)]
     pub sensor_places_mm: Option<Vec<Vec<f64>>>,
-    /// True if contacts in use have this force too.
+    /// True if contacts in use have this force.
     pub force_is_known: bool,
-    /// Replaces existing files.
     #[serde(default)]
     pub overwrite: bool,
-    /// Writes the file; without it only the text is made.
     #[serde(default)]
     pub write: bool,
 }
 
-/// Error of a form that does not result in a rig.
+/// Error of a form.
 #[derive(Debug, thiserror::Error)]
 pub enum RigFormError {
-    /// A field has an invalid value.
+    /// Invalid value of a field.
     #[error("{problem}")]
     Field {
         /// Name of the field in the form.
@@ -65,13 +59,13 @@ pub enum RigFormError {
         /// Problem and bound.
         problem: String,
     },
-    /// The name is not a plain file name.
+    /// Invalid file name.
     #[error("`{name}` cannot name a rig: use letters, digits, `-`, `_`, and `.toml` at the end")]
     Name {
         /// The name.
         name: String,
     },
-    /// The number of channels differs from that of the board.
+    /// Wrong number of channels.
     #[error("{given} channels, and the board sends {sent} values")]
     Channels {
         /// Channels of the form.
@@ -79,7 +73,7 @@ pub enum RigFormError {
         /// Values of the board.
         sent: usize,
     },
-    /// The board names its values, and the form has another name.
+    /// Channel name that differs from the board's.
     #[error("channel `{given}`: the board calls it `{sent}`")]
     Renamed {
         /// Name of the form.
@@ -87,53 +81,53 @@ pub enum RigFormError {
         /// Name of the board.
         sent: String,
     },
-    /// The number of entries for places differs from the number of directions.
+    /// Wrong number of place counts.
     #[error("{given} numbers of places, and the surface has {directions} directions")]
     Places {
-        /// Numbers of the form.
+        /// Counts of the form.
         given: usize,
         /// Directions of the surface.
         directions: usize,
     },
-    /// This source cannot leave out values without names.
+    /// Source that cannot exclude values.
     #[error("the source {from} cannot leave unnamed values out")]
     LeftOut {
-        /// The source.
+        /// URL of the source.
         from: String,
     },
-    /// The rig has an invalid entry.
+    /// Invalid entry of the rig.
     #[error("{0}")]
     Rig(#[from] RigError),
-    /// The rig has no place to press.
+    /// Error of the plan.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// The URL of the source cannot contain these names.
+    /// Names unsuitable for a URL.
     #[error("{0}")]
     Columns(#[from] SourceUrlError),
-    /// A file exists already.
+    /// Existing file.
     #[error("{path} exists already")]
     Exists {
-        /// The file.
+        /// File name.
         path: String,
     },
-    /// The presses of an earlier calibration exist, and are not replaced.
+    /// Presses of an earlier calibration.
     #[error("{path} has presses of an earlier calibration: choose another name for the rig")]
     Presses {
-        /// The file.
+        /// File name.
         path: String,
     },
-    /// The file cannot be written.
+    /// Unwritable file.
     #[error("cannot write {path}: {error}")]
     Write {
-        /// The file.
+        /// File name.
         path: String,
-        /// Why.
+        /// Cause.
         error: std::io::Error,
     },
 }
 
 impl RigFormError {
-    /// Name of the form field that must be corrected, if the error is in one.
+    /// Form field to be corrected, if any.
     pub fn field(&self) -> Option<&'static str> {
         match self {
             Self::Field { field, .. } => Some(field),
@@ -147,45 +141,36 @@ impl RigFormError {
     }
 }
 
-/// A rig with the files of its calibration.
+/// Rig with its files.
 #[derive(Debug)]
 pub struct MadeRig {
-    /// The rig.
     pub rig: Rig,
-    /// Source of its readings.
     pub from: SourceUrl,
-    /// Files and text.
     pub record: MadeRigRecord,
-    /// The rig's file.
     path: PathBuf,
-    /// File of the presses.
     pub presses: PathBuf,
-    /// File of the locator.
     pub out: PathBuf,
-    /// Statements of the form.
     pub statements: Statements,
 }
 
-/// A rig that was made, as a record of JSON.
+/// JSON record of a rig.
 #[derive(Clone, Debug, Serialize)]
 pub struct MadeRigRecord {
-    /// The rig's file.
     pub file: String,
-    /// Text.
     pub text: String,
-    /// Command that calibrates the rig later.
+    /// Command for a later calibration.
     pub command: String,
     /// True if the rig is on disk.
     pub written: bool,
-    /// Files that would be replaced.
+    /// Existing files.
     pub exists: Vec<String>,
 }
 
 impl MadeRig {
-    /// The rig of a form, for a board with these values.
+    /// Creates the rig for a board with these channels.
     ///
     /// # Errors
-    /// [`RigFormError`] for a form that does not result in a rig.
+    /// [`RigFormError`] of the form.
     pub fn new(
         form: &RigForm,
         from: &SourceUrl,
@@ -219,10 +204,10 @@ impl MadeRig {
         Ok(Self { rig, from, record, path, presses, out, statements })
     }
 
-    /// Writes the rig's file.
+    /// Writes the rig file.
     ///
     /// # Errors
-    /// [`RigFormError::Exists`] for an existing file, unless it may be replaced; [`RigFormError::Presses`], [`RigFormError::Write`].
+    /// [`RigFormError::Exists`] unless `overwrite`, `Presses`, or `Write`.
     pub fn write(&mut self, overwrite: bool) -> Result<(), RigFormError> {
         let name = |path: &Path| path.display().to_string();
         if is_there(&self.presses) {
@@ -242,13 +227,11 @@ fn is_there(path: &Path) -> bool {
     path.symlink_metadata().is_ok()
 }
 
-/// Command that later calibrates a rig, from a source into these files.
 fn command(form: &RigForm, from: &SourceUrl, [rig, presses, out]: [&str; 3]) -> String {
     let second = form.second_force_n.map_or(String::new(), |n| format!(" --second-force '{n} N'"));
     format!("palpate serve {rig} --calibrate --from '{from}' --presses {presses} --out {out}{second}")
 }
 
-/// Refuses numbers that are impossible for a surface or a press.
 fn check_numbers(form: &RigForm) -> Result<(), RigFormError> {
     let refuse = |field, problem| Err(RigFormError::Field { field, problem });
     let positive = [
@@ -313,7 +296,7 @@ fn check_sensor_places(form: &RigForm, sides_mm: &[f64]) -> Result<(), RigFormEr
     Ok(())
 }
 
-/// Stem of a plain file name that ends in `.toml`.
+/// Stem of a `.toml` file name.
 fn checked_stem(name: &str) -> Result<&str, RigFormError> {
     let plain = |stem: &&str| {
         let is_plain = |one: char| one.is_ascii_alphanumeric() || matches!(one, '-' | '_' | '.');
@@ -326,7 +309,7 @@ fn checked_stem(name: &str) -> Result<&str, RigFormError> {
     stem.ok_or_else(|| RigFormError::Name { name: name.chars().take(LONGEST_NAME).collect() })
 }
 
-/// Channels of the form that are used. If the board names its values, they keep these names.
+/// Included channels, under the board's names.
 fn used_channels(form: &RigForm, sent: &[String], named: bool) -> Result<Vec<String>, RigFormError> {
     if form.channels.len() != sent.len() {
         return Err(RigFormError::Channels { given: form.channels.len(), sent: sent.len() });
@@ -338,7 +321,7 @@ fn used_channels(form: &RigForm, sent: &[String], named: bool) -> Result<Vec<Str
     Ok(pairs.map(|(given, _)| given.clone()).collect())
 }
 
-/// The source with names for its values, including those that are left out.
+/// Source with names, including excluded values.
 fn with_columns(from: &SourceUrl, form: &RigForm) -> Result<SourceUrl, RigFormError> {
     let left_out = form.channels.iter().any(String::is_empty);
     let mut named = from.clone();
@@ -356,7 +339,7 @@ fn with_columns(from: &SourceUrl, form: &RigForm) -> Result<SourceUrl, RigFormEr
         _ if left_out => return Err(RigFormError::LeftOut { from: from.to_string() }),
         _ => {}
     }
-    // Names that the URL would split are refused.
+    // Refuses names that the URL would split.
     let text = named.to_string();
     let again: SourceUrl = text.parse()?;
     if again == named {
@@ -366,7 +349,7 @@ fn with_columns(from: &SourceUrl, form: &RigForm) -> Result<SourceUrl, RigFormEr
     Err(SourceUrlError::Parameter { text, problem }.into())
 }
 
-/// A place in the notation of the rig's file: a length, or a list of two on a plane.
+/// In the notation of a rig file.
 fn point(place_mm: &[f64]) -> String {
     let lengths: Vec<String> =
         place_mm.iter().map(|at_mm| toml::Value::from(format!("{at_mm} mm")).to_string()).collect();
@@ -376,14 +359,13 @@ fn point(place_mm: &[f64]) -> String {
     }
 }
 
-/// Range of forces of contacts that follows from the presses alone, in the notation of the rig's file.
+/// Force range given by the presses alone, in the notation of a rig file.
 fn pressed_range(form: &RigForm) -> Option<String> {
     let forces_n = form.force_n.into_iter().chain(form.second_force_n);
     let (least_n, greatest_n) = ForceRange::of_presses(forces_n)?.ends_n();
     Some(format!("[\"{least_n} N\", \"{greatest_n} N\"]"))
 }
 
-/// Text of the rig's file.
 fn text_of(form: &RigForm, channels: &[String]) -> Result<String, RigFormError> {
     let quoted = |text: &str| toml::Value::from(text).to_string();
     let mm = |value: f64| quoted(&format!("{value} mm"));
@@ -510,9 +492,9 @@ mod tests {
         let placement_sd_m = made.rig.training.as_ref().unwrap().placement_sd_m;
         assert_eq!((placement_sd_m, made.statements.placement_sd_m), (Some(2e-3), Some(2e-3)));
         assert!(made.record.command.ends_with("--second-force '4 N'"), "{}", made.record.command);
-        // Every other place among the 10 is also pressed with the second weight.
+        // The second weight applies to every other of 10 places.
         assert_eq!(plan(&made.rig, made.statements.weights(None), &[], &[]).unwrap().len(), 20 + 10);
-        // Forces in use extend a decade to either side of these, unless the comment in the text becomes a line.
+        // The range extends a decade to either side, unless the comment becomes a line.
         assert_eq!(made.rig.setup.force_range(), None);
         let stated =
             made.record.text.replace("# [contact]", "[contact]").replace("# force_range", "force_range");

@@ -23,9 +23,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use std::sync::Arc;
 
-/// Most bytes of a body.
 const MOST_BYTES: usize = 1 << 16;
-/// Most characters of a mark.
 const MOST_OF_A_MARK: usize = 200;
 
 type Answer = Result<JsonAnswer<Value>, Refusal>;
@@ -64,12 +62,11 @@ async fn session(State(live): State<Arc<Live>>) -> JsonAnswer<SessionInfo> {
     JsonAnswer(live.info())
 }
 
-/// The last minutes of the session.
 async fn history(State(live): State<Arc<Live>>) -> Response {
     ([(CONTENT_TYPE, "application/json")], live.past()).into_response()
 }
 
-/// An object without fields that matter.
+/// Object with ignored fields.
 #[derive(Deserialize)]
 struct Nothing {}
 
@@ -98,7 +95,6 @@ async fn alarms(State(live): State<Arc<Live>>) -> JsonAnswer<Value> {
     JsonAnswer(json!({ "text": text, "file": file.map(|file| file.path().display().to_string()) }))
 }
 
-/// Rules of alarms, as the text of a rule file.
 #[derive(Deserialize)]
 struct AlarmRules {
     text: String,
@@ -127,16 +123,15 @@ async fn source(State(live): State<Arc<Live>>, JsonBody(Source { url }): JsonBod
             "name other sources by `palpate serve LOCATOR --from URL`",
         ));
     }
-    // A session that ends is waited for, and a board is prepared.
+    // Waits for the end of the running session.
     blocking(move || live.begin_simulated()).await.map(|()| JsonAnswer(json!({})))
 }
 
 async fn bring_up(State(live): State<Arc<Live>>) -> Result<JsonAnswer<BringUpRecord>, Refusal> {
-    // Ports are looked for.
+    // Listing the ports is slow.
     blocking(move || live.seen()).await.map(JsonAnswer)
 }
 
-/// A serial port of the server's machine, and its bits a second.
 #[derive(Deserialize)]
 struct Port {
     port: Option<String>,
@@ -159,12 +154,12 @@ async fn make_rig(
     State(live): State<Arc<Live>>,
     JsonBody(form): JsonBody<RigForm>,
 ) -> Result<JsonAnswer<MadeRigRecord>, Refusal> {
-    // A source that ends is waited for, and the rig is written to the disk.
+    // Waits for the end of the source and for the disk.
     blocking(move || live.make_rig(&form)).await.map(JsonAnswer)
 }
 
 async fn calibration(State(live): State<Arc<Live>>) -> Result<JsonAnswer<CalibrationRecord>, Refusal> {
-    // A step that goes on may have it.
+    // A step may have locked the state.
     blocking(move || {
         live.attend();
         live.calibration()
@@ -173,17 +168,16 @@ async fn calibration(State(live): State<Arc<Live>>) -> Result<JsonAnswer<Calibra
     .map(JsonAnswer)
 }
 
-/// The presses so far; apart from the state, as their traces are long.
+/// Separate from the state, because traces are long.
 async fn calibration_presses(State(live): State<Arc<Live>>) -> Result<JsonAnswer<Vec<PressRecord>>, Refusal> {
     blocking(move || Ok(live.calibrator()?.presses())).await.map(JsonAnswer)
 }
 
-/// Stops the machine of a calibration before anything else is waited for, be it the rest of the request.
+/// Does not wait for the body.
 async fn emergency_stop(State(live): State<Arc<Live>>) -> Answer {
     done(live.calibrator().and_then(|calibrator| Ok(calibrator.halt()?)))
 }
 
-/// A step of a calibration.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Step {
@@ -201,7 +195,6 @@ enum Step {
     TouchOff,
 }
 
-/// An axis of a machine.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Axis {
@@ -213,12 +206,12 @@ enum Axis {
 #[derive(Deserialize)]
 struct Calibrate {
     step: Step,
-    /// Of `strike`: the number of the press.
+    /// For `strike`.
     press: Option<usize>,
-    /// Of `jog`: the axis, and the distance.
+    /// For `jog`.
     axis: Option<Axis>,
     by_mm: Option<f64>,
-    /// Of `begin`: what the operator states.
+    /// For `begin`.
     placement_mm: Option<f64>,
     second_force_n: Option<f64>,
     #[serde(default)]
@@ -226,7 +219,6 @@ struct Calibrate {
 }
 
 impl Calibrate {
-    /// The distances of a jog along x, y and z; 0 where it names none.
     fn jog(&self) -> SetUpTask {
         let by_m = self.by_mm.unwrap_or_default() * 1e-3;
         SetUpTask::Jog(match self.axis {
@@ -246,12 +238,11 @@ impl Calibrate {
     }
 }
 
-/// Does a step; the answer is the state after it.
 async fn calibrate(
     State(live): State<Arc<Live>>,
     JsonBody(wish): JsonBody<Calibrate>,
 ) -> Result<JsonAnswer<CalibrationRecord>, Refusal> {
-    // A source that ends is waited for, and presses are written to the disk.
+    // Waits for the end of a source, and for the disk.
     blocking(move || {
         live.attend();
         match wish.step {
@@ -361,7 +352,7 @@ struct Record {
 }
 
 async fn record(State(live): State<Arc<Live>>, JsonBody(Record { on, name }): JsonBody<Record>) -> Answer {
-    // A recording that ends is written to its last byte first.
+    // Waits for the last byte of a recording.
     blocking(move || {
         let status = if on { live.begin_recording(name.as_deref()).map(Some) } else { live.end_recording() };
         status.map(|status| json!({ "recording": status }))
@@ -374,7 +365,6 @@ async fn recordings(State(live): State<Arc<Live>>) -> Result<JsonAnswer<Vec<Reco
     blocking(move || live.list_recordings()).await.map(JsonAnswer)
 }
 
-/// Part of a recording, and how finely it is told.
 #[derive(Deserialize)]
 struct Part {
     from_s: Option<f64>,
@@ -382,7 +372,7 @@ struct Part {
     points: Option<usize>,
 }
 
-/// Samples of a part of a recording unless more or fewer are asked for, and at most.
+/// Default and largest number of points.
 const POINTS: (usize, usize) = (2000, 20_000);
 
 async fn recording(
@@ -399,7 +389,7 @@ async fn recording(
     blocking(move || live.read_recording(&name, span_s, points)).await.map(JsonAnswer)
 }
 
-/// Most bytes of a recording that is sent whole; it is held in memory meanwhile.
+/// Limit on files sent from memory.
 const MOST_OF_A_FILE: u64 = 256 << 20;
 
 async fn recording_file(
@@ -435,7 +425,6 @@ async fn recording_file(
     }
 }
 
-/// Does what may wait for a disk or a thread.
 async fn blocking<T: Send + 'static>(
     work: impl FnOnce() -> Result<T, LiveError> + Send + 'static,
 ) -> Result<T, Refusal> {
@@ -451,13 +440,12 @@ async fn unknown() -> Refusal {
     Refusal::new(StatusCode::NOT_FOUND, "the request does not exist", "docs/reference/server.md lists them")
 }
 
-/// A path that is there, asked by a method that it has not; those that it has are in the header `Allow`.
+/// The header `Allow` lists the valid methods.
 async fn other_method(method: Method) -> Refusal {
     let error = format!("{method} is not a method of this request");
     Refusal::new(StatusCode::METHOD_NOT_ALLOWED, error, "docs/reference/server.md lists the methods")
 }
 
-/// The name of a recording in a path.
 fn name_in(path: Result<Path<String>, PathRejection>) -> Result<String, Refusal> {
     let help = "write a name as GET /api/recordings has it";
     path.map(|Path(name)| name).map_err(|error| Refusal::new(error.status(), error.body_text(), help))

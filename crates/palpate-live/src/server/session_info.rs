@@ -1,4 +1,4 @@
-//! Description of a session: its locator, its surface, and the attainable accuracy.
+//! Description of a session.
 
 use super::calibration::Calibrator;
 use crate::frame::Channel;
@@ -13,12 +13,12 @@ use palpate_mechanics::surface::{BeamSupportKind, Extent, SurfaceSpec};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-/// Longest time that the limit over the surface may take to compute, in seconds.
+/// Limit on the time for the accuracy limit.
 const LIMIT_S: f64 = 5.0;
-/// Force of the limit if the setup has no known force.
+/// Force of the accuracy limit, if unknown.
 const FORCE_N: f64 = 1.0;
 
-/// Description of a session as a record of JSON.
+/// JSON record of a session.
 #[derive(Clone, Debug, Serialize)]
 pub struct SessionInfo {
     version: &'static str,
@@ -33,14 +33,13 @@ pub struct SessionInfo {
     source: Option<String>,
     recording: Option<Value>,
     has_simulated: bool,
-    /// True if the server has a calibration, which `/api/calibration` describes.
+    /// See `/api/calibration`.
     calibrates: bool,
-    /// True if there is a board without a rig, which `/api/bring-up` shows.
+    /// See `/api/bring-up`.
     brings_up: bool,
 }
 
 impl SessionInfo {
-    /// The description of sessions with a locator of this name.
     pub fn new(locator: &Locator, name: &str, has_simulated: bool) -> Self {
         let description = description::locator(locator);
         Self {
@@ -55,7 +54,6 @@ impl SessionInfo {
         }
     }
 
-    /// The description of a bench without a locator.
     pub fn of_setup(setup: &Setup) -> Self {
         let known_n = setup.force_n();
         let why = "the locator does not exist yet: the calibration has not ended";
@@ -76,7 +74,6 @@ impl SessionInfo {
         }
     }
 
-    /// The description of a board without a rig.
     pub fn without_rig() -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION"),
@@ -95,27 +92,22 @@ impl SessionInfo {
         }
     }
 
-    /// Sets the source of the session that runs.
     pub fn with_source(self, source: Option<String>) -> Self {
         Self { source, ..self }
     }
 
-    /// Sets the estimation method of the sessions.
     pub fn with_estimation(self, estimation: Estimation) -> Self {
         Self { estimation, ..self }
     }
 
-    /// Sets whether there is a calibration.
     pub fn with_calibration(self, calibrator: Option<&Calibrator>) -> Self {
         Self { calibrates: calibrator.is_some(), ..self }
     }
 
-    /// Sets whether there is a board without a rig.
     pub fn with_bring_up(self, brings_up: bool) -> Self {
         Self { brings_up, ..self }
     }
 
-    /// Sets the folder of recordings, and the state of the recording in progress; `None` if sessions are not recorded.
     pub fn with_recording(self, recording: Option<(String, Option<RecordingStatus>)>) -> Self {
         let recording = recording.map(|(folder, status)| match status {
             Some(RecordingStatus { name, bytes, seconds, problem, .. }) => {
@@ -172,7 +164,7 @@ fn channels(setup: &Setup) -> Vec<Value> {
         .collect()
 }
 
-/// The limit over the surface; `None` if there is none, or the computation takes too long.
+/// Accuracy limit over the surface, if fast to compute.
 fn limit(locator: &Locator) -> Option<Value> {
     let setup = locator.learnt_setup().ok()?;
     let extent = setup.surface().extent();
@@ -180,7 +172,7 @@ fn limit(locator: &Locator) -> Option<Value> {
         Some(linear) => linear.cramer_rao_bound(extent),
         None => {
             let cost = CramerRaoBound::cost(setup.surface().model()?, setup.layout(), 0);
-            // This is a lower bound on the time, because no search for contacts with equal readings is made.
+            // Lower bound, without a search for ambiguous contacts.
             if cost.seconds[0] > LIMIT_S {
                 return None;
             }

@@ -1,4 +1,4 @@
-//! A calibration in progress, shared by the thread that presses and the requests that read its state.
+//! Shared state of a calibration.
 
 use super::machine::MachineState;
 use crate::calibration::{Calibration, CalibrationError, Note, SetUpNote, SetUpTask, last_deviation_percent};
@@ -7,23 +7,21 @@ use crate::input::Arrived;
 use crate::stamp::HostClock;
 use std::collections::VecDeque;
 
-/// State of a calibration in progress, for other threads to read.
+/// State of a calibration.
 pub struct Shared {
     pub calibration: Calibration,
-    /// Clock of the arrivals.
     pub clock: HostClock,
     pub source: Option<String>,
     pub last_percent: Option<f64>,
     pub problem: Option<String>,
-    /// Reason for requesting a press again, or what a long step waits for.
+    /// Reason for a repeated request, or awaited condition.
     pub hint: Option<String>,
     pub machine: MachineState,
-    /// Tasks of a machine that is set up, which its thread has not started yet.
+    /// Pending set-up tasks.
     pub tasks: VecDeque<SetUpTask>,
 }
 
 impl Shared {
-    /// Processes an arrival from the source; returns the resulting notes.
     pub fn receive(&mut self, arrived: &Arrived) -> Vec<Note> {
         let mut notes = Vec::new();
         let received = self.calibration.receive(arrived, &mut notes);
@@ -34,7 +32,7 @@ impl Shared {
         notes
     }
 
-    /// Checks the source during a silence; returns the resulting notes.
+    /// Checks the source during silence.
     pub fn look(&mut self) -> Vec<Note> {
         let mut notes = Vec::new();
         self.calibration.check_feed(self.clock.now().elapsed, &mut notes);
@@ -71,7 +69,6 @@ impl Shared {
         }
     }
 
-    /// Stores the result of a task of the set-up.
     pub fn take_set_up(&mut self, note: SetUpNote) {
         if let SetUpNote::Touch(z_m) = note {
             self.machine.touch_z_m = Some(z_m);
@@ -79,14 +76,13 @@ impl Shared {
         self.hint = Some(sentence(&note.to_string()));
     }
 
-    /// Stops after a press that is not on disk: the guide must not continue.
+    /// Stops after a failed recording.
     fn fail(&mut self, error: &CalibrationError) {
         self.calibration.stop();
         self.problem = Some(error.to_string());
     }
 }
 
-/// Formats words as a sentence: with a capital letter and a full stop.
 fn sentence(words: &str) -> String {
     let mut letters = words.chars();
     let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! The stream of a session to one browser.
+//! Stream of a session to a browser.
 
 use super::body::Refusal;
 use super::connections::most_open;
@@ -17,14 +17,12 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::broadcast::{Receiver, error::RecvError};
 
-/// Largest number of bytes of a message from a browser.
 const MOST_BYTES: usize = 4096;
-/// Largest number of bytes that wait for a browser, in addition to the message that is being written.
 const MOST_WAITING: usize = 1 << 20;
-/// Time after which a browser that does not read is disconnected.
+/// Time before a browser that does not read is disconnected.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Query of a browser that opens the stream.
+/// Query of a stream.
 #[derive(Debug, Deserialize)]
 pub struct Wish {
     #[serde(default)]
@@ -93,11 +91,10 @@ async fn follow(mut socket: WebSocket, hub: &Hub, wish: &Wish, live: &Live) {
     }
 }
 
-/// Time between two pings to a page while a machine needs to be watched.
+/// Ping interval for attendance.
 const PING_EVERY: Duration = Duration::from_secs(1);
 
-/// Sends messages until the browser disconnects, sends too much, or stops reading. If `page_of` is given, the page receives pings while a machine
-/// needs to be watched.
+/// Sends messages while the browser reads; `page_of` adds pings for attendance.
 async fn send_all<T: Clone>(
     socket: &mut WebSocket,
     mut messages: Receiver<T>,
@@ -120,9 +117,9 @@ async fn send_all<T: Clone>(
                 Err(RecvError::Lagged(count)) => missed += count,
                 Err(RecvError::Closed) => return,
             },
-            // Messages from a browser are ignored; the socket answers pings.
+            // The socket answers pings; messages are ignored.
             received = socket.recv() => match received {
-                // The answer to a close message is sent with the next read, which is the last.
+                // The last read sends the answer to a close message.
                 Some(Ok(Message::Close(_))) => {
                     let _ = tokio::time::timeout(PATIENCE, socket.recv()).await;
                     return;

@@ -1,4 +1,4 @@
-//! The sink that browsers read: each message is encoded once, and all browsers share its bytes.
+//! Sink of browsers, which share the encoded messages.
 
 use super::connections::most_open;
 use super::lock::locked;
@@ -16,13 +16,10 @@ use serde::Serialize;
 use std::sync::{Arc, Mutex};
 use tokio::sync::{Semaphore, broadcast};
 
-/// Number of messages that wait for a browser at 60 Hz: about a second.
+/// Queue at 60 Hz: about a second.
 const STATES: usize = 64;
-/// Number of messages that wait for a browser that receives every sample.
 const BATCHES: usize = 512;
-/// Largest number of samples of a message at 60 Hz.
 const MOST_SAMPLES: usize = 64;
-/// End of a message at 60 Hz without missed messages before it.
 const NONE_MISSED: &str = "\"missed\":0}";
 
 /// Connection between a session and its browsers.
@@ -32,7 +29,6 @@ pub struct Hub {
     pub(super) json: broadcast::Sender<Utf8Bytes>,
     pub(super) binary: broadcast::Sender<Bytes>,
     pub(super) places: Arc<Semaphore>,
-    /// The last minutes of the session.
     pub(super) past: Arc<Mutex<Past>>,
 }
 
@@ -49,7 +45,6 @@ impl Default for Hub {
 }
 
 impl Hub {
-    /// Removes the past of a session that has ended.
     pub(super) fn forget_past(&self) {
         *locked(&self.past) = Past::default();
     }
@@ -61,7 +56,6 @@ pub struct WebSink {
     hub: Hub,
     channels: Vec<Channel>,
     extent: Extent,
-    /// Batches since the last state.
     recent: Vec<Arc<Batch>>,
 }
 
@@ -80,12 +74,11 @@ struct Stated<'a> {
 }
 
 impl WebSink {
-    /// A sink of samples of these channels.
+    /// Creates a sink for these channels.
     pub fn new(hub: Hub, channels: &[Channel], extent: Extent) -> Self {
         Self { hub, channels: channels.to_vec(), extent, recent: Vec::new() }
     }
 
-    /// Stores the samples and events of a batch for browsers that connect later.
     fn keep(&self, batch: &Batch) {
         let mut past = locked(&self.hub.past);
         for output in &batch.outputs {
@@ -117,7 +110,7 @@ impl Sink for WebSink {
         if self.hub.json.receiver_count() > 0 {
             let samples = batch.samples().map(|sample| self.record(sample)).collect();
             if let Ok(text) = serde_json::to_string(&Batched { samples, events: batch.events().collect() }) {
-                // There may be no browser any more.
+                // Fails without browsers.
                 let _ = self.hub.json.send(text.into());
             }
         }
@@ -143,7 +136,7 @@ impl Sink for WebSink {
     }
 }
 
-/// At most `MOST_SAMPLES` of these samples, evenly spaced, always with the last one.
+/// Evenly spaced samples, including the last.
 fn thinned<'a>(samples: &[&'a Sample]) -> Vec<&'a Sample> {
     let every = samples.len().div_ceil(MOST_SAMPLES).max(1);
     let mut thinned: Vec<&Sample> = samples.iter().rev().step_by(every).copied().collect();
@@ -151,7 +144,7 @@ fn thinned<'a>(samples: &[&'a Sample]) -> Vec<&'a Sample> {
     thinned
 }
 
-/// A message at 60 Hz for a browser that has missed messages before it.
+/// Adds the number of missed messages.
 pub fn with_missed(message: &Utf8Bytes, missed: u64) -> Utf8Bytes {
     match message.strip_suffix(NONE_MISSED) {
         Some(rest) if missed > 0 => format!("{rest}\"missed\":{missed}}}").into(),
@@ -159,14 +152,11 @@ pub fn with_missed(message: &Utf8Bytes, missed: u64) -> Utf8Bytes {
     }
 }
 
-/// Version of the binary packets.
 const PACKET_VERSION: u8 = 2;
-/// Bytes before the samples of a packet.
 const HEAD_BYTES: usize = 8;
-/// Bytes of a sample before its reading.
 const SAMPLE_BYTES: usize = 48;
 
-/// The samples of a batch as a packet, described in docs/reference/server.md; empty without samples.
+/// Encodes a batch (docs/reference/server.md).
 fn packet(batch: &Batch, channels: &[Channel]) -> Vec<u8> {
     let count = batch.samples().count();
     if count == 0 {
@@ -201,7 +191,6 @@ fn packet(batch: &Batch, channels: &[Channel]) -> Vec<u8> {
     bytes
 }
 
-/// Number of a status in a packet.
 fn code(status: Status) -> u8 {
     match status {
         Status::NoContact => 0,
@@ -231,7 +220,7 @@ mod tests {
         let message = slow.try_recv().unwrap();
         let told: serde_json::Value = serde_json::from_str(&with_missed(&message, 136)).unwrap();
         assert_eq!((&told["missed"], &told["state"]["counters"]["readings"]), (&136.into(), &136.into()));
-        // Without missed messages, the bytes are shared with all others.
+        // The bytes are shared, without missed messages.
         assert_eq!(with_missed(&message, 0).as_ptr(), message.as_ptr());
     }
 }

@@ -1,4 +1,4 @@
-//! Touch-down, move and lift-off events from a sequence of estimates.
+//! Detector of contact events.
 
 use super::touches;
 use crate::event::Event;
@@ -7,28 +7,23 @@ use palpate_estimators::estimate_record::ContactRecord;
 use palpate_mechanics::surface::Extent;
 use std::time::Duration;
 
-/// Consecutive readings that count as a change: one noise reading in a thousand is mistaken for a contact.
+/// The false-alarm rate of a reading is 0.001.
 const IN_A_ROW: u32 = 2;
-/// Consecutive readings that count as a change to `outside_model`: about three readings of a contact in a thousand have this status.
+/// 0.003 of the readings of a contact are `outside_model`.
 const DOUBTS_IN_A_ROW: u32 = 3;
-/// Shortest distance that counts as a move, as a share of the length.
+/// Shortest move as a share of the length.
 const MOVE: f64 = 0.01;
-/// Shortest time between two reported moves.
 const BETWEEN_MOVES: Duration = Duration::from_millis(50);
 
-/// Detector of contact events.
 #[derive(Debug)]
 pub struct ContactWatch {
     extent: Extent,
     state: State,
-    /// State of the last estimates, and the number of consecutive ones.
     recent: (State, u32),
-    /// Time of the touch-down; `None` before it and after the lift-off.
     since: Option<Duration>,
     told: (Position, Duration),
 }
 
-/// State of the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Untouched,
@@ -37,7 +32,6 @@ enum State {
 }
 
 impl ContactWatch {
-    /// A detector for an untouched surface.
     pub fn new(extent: Extent) -> Self {
         Self {
             extent,
@@ -48,12 +42,10 @@ impl ContactWatch {
         }
     }
 
-    /// True while the surface is touched.
     pub fn is_touched(&self) -> bool {
         self.state != State::Untouched
     }
 
-    /// Processes the next estimate.
     pub fn add(&mut self, now: Duration, estimate: &Estimate, mut tell: impl FnMut(Event)) {
         let next = match estimate.status {
             status if touches(status) => State::Touched { contacts: 1 + estimate.further.as_slice().len() },

@@ -1,4 +1,4 @@
-//! Estimates of contacts that the tracker follows from reading to reading.
+//! Tracked estimates.
 
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_estimators::estimator::{
@@ -7,23 +7,22 @@ use palpate_estimators::estimator::{
 use palpate_estimators::status::PLACE_LEFT_OPEN;
 use palpate_mechanics::surface::Extent;
 
-/// A tracker that reports its state as estimates.
+/// Tracker that returns estimates.
 pub struct Follower {
     tracking: Tracking,
     config: TrackerConfig,
     tracker: Tracker,
     extent: Extent,
-    /// Time of the first reading, from which the tracker's seconds count: seconds since 1970 have too few digits for microseconds.
+    /// Origin of the times: seconds since 1970 have too few digits for microseconds.
     first_ns: Option<u64>,
-    /// Difference between the last reading and its tared reading.
     baseline: Vec<f64>,
 }
 
 impl Follower {
-    /// A follower in its initial state.
+    /// Creates a tracker.
     ///
     /// # Errors
-    /// [`NotTrackable`] for a locator that the tracker cannot use, or a surface with unknown modes.
+    /// [`NotTrackable`].
     pub fn new(locator: &Locator, config: TrackerConfig) -> Result<Self, NotTrackable> {
         let tracking = locator.tracking(&config)?;
         Ok(Self {
@@ -36,17 +35,16 @@ impl Follower {
         })
     }
 
-    /// The estimate after the next reading. `tared` is its tared reading, `unix_ns` its time in nanoseconds since 1970, and `single` its estimate
-    /// by itself.
+    /// Returns the estimate after a reading at `unix_ns` since 1970; `single` for a time that does not
+    /// increase.
     ///
-    /// A reading of 1e300, for example, makes the tracker's state non-finite. The tracker then restarts, and the estimate is `single`. A reading
-    /// that is not later than the previous one also gives `single`.
+    /// A state that is not finite, as after a reading of 1e300, restarts the tracker with `single`.
     pub fn follow(&mut self, unix_ns: u64, reading: &[f64], tared: &[f64], single: Estimate) -> Estimate {
         let time_s = unix_ns.saturating_sub(*self.first_ns.get_or_insert(unix_ns)) as f64 * 1e-9;
         self.follow_baseline(reading, tared);
         let Ok(track) = self.tracker.follow(time_s, tared) else { return single };
         let estimate = self.estimate(&track, track.single);
-        // Weights that are not finite leave no probability to any hypothesis, in all later steps too.
+        // Weights that are not finite remain so in all later steps.
         let has_probability = (track.numbers.iter().sum::<f64>() - 1.0).abs() < 1e-6;
         if has_probability && estimate.is_in_numbers() {
             return estimate;
@@ -55,7 +53,6 @@ impl Follower {
         single
     }
 
-    /// Passes the change of the tare's baseline since the last reading to the tracker.
     fn follow_baseline(&mut self, reading: &[f64], tared: &[f64]) {
         let moved: Vec<f64> = reading.iter().zip(tared).map(|(reading, tared)| reading - tared).collect();
         if self.baseline.len() == moved.len() {
@@ -67,11 +64,11 @@ impl Follower {
         self.baseline = moved;
     }
 
-    /// The tracker's contacts, in the most probable number. Each keeps its place in the list while it is tracked.
+    /// Most probable contacts in constant order.
     ///
-    /// - `no_contact`: the most probable state is an untouched surface.
-    /// - `outside_model`: the reading by itself has this status, and the tracker has no model of swing. A single reading cannot account for swing.
-    /// - `ambiguous`: the 95 % interval leaves the place undetermined. Other possible places are within the interval.
+    /// - `outside_model`: status of the reading, unless swing is modelled, which a reading cannot account
+    ///   for.
+    /// - `ambiguous`: the 95 % interval leaves the position undetermined.
     fn estimate(&self, track: &Track, single: Estimate) -> Estimate {
         let is_outside = single.status == Status::OutsideModel && self.config.swing.is_none();
         let mut contacts = track.contacts.iter().map(Tracked::estimate);
@@ -94,7 +91,6 @@ impl Follower {
         estimate
     }
 
-    /// True if the 95 % intervals cover nearly the full extent in every direction.
     fn leaves_place_open(&self, contact: &ContactEstimate) -> bool {
         let Some(uncertainty) = &contact.uncertainty else { return false };
         let is_open = |(low_m, high_m): (f64, f64), side_m: f64| high_m - low_m >= PLACE_LEFT_OPEN * side_m;

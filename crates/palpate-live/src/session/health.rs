@@ -1,12 +1,11 @@
-//! Health of the channels.
+//! Health of channels.
 
 use crate::event::{ChannelState, Event};
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use serde::Serialize;
 
-/// Consecutive equal readings after which a channel counts as dead, if other channels change.
+/// Consecutive equal readings of a dead channel.
 const DEAD: u32 = 100;
-/// Consecutive readings at the end of the range after which a channel is saturated.
 const SATURATED: u32 = 5;
 
 /// Health of a channel.
@@ -16,14 +15,13 @@ pub struct ChannelHealth {
     pub name: String,
     /// State.
     pub state: ChannelState,
-    /// Lowest and highest value so far, in its SI unit or raw.
+    /// Lowest and highest value in SI units or raw.
     pub range: [f64; 2],
-    /// Standard deviation of the noise of a reading, from pairs of successive untouched readings, in its SI unit or raw; 0 before the first pair.
+    /// Standard deviation of untouched readings in SI units or raw; 0 if unknown.
     pub noise_sd: f64,
 }
 
-/// True for an end of the range of a converter of 10 to 32 bits, signed or unsigned: 2ⁿ − 1 or −2ⁿ. The value counts as an end only while no
-/// channel reads beyond it.
+/// 2ⁿ − 1 or −2ⁿ of a converter of 10 to 32 bits.
 fn is_converter_end(value: f64) -> bool {
     (9..=32).any(|bits| {
         let range = 2_f64.powi(bits);
@@ -31,27 +29,20 @@ fn is_converter_end(value: f64) -> bool {
     })
 }
 
-/// Monitor of the health of channels.
 #[derive(Debug)]
 pub struct HealthWatch {
     channels: Vec<ChannelHealth>,
-    /// Ends of the range of each channel, where they are known.
     limits: Vec<Option<(f64, f64)>>,
-    /// True for a channel with raw converter values.
     is_raw: Vec<bool>,
-    /// Least and greatest value of all raw channels so far.
     raw_range: [f64; 2],
     last: Vec<f64>,
-    /// The second to last reading.
     before: Vec<f64>,
     same: Vec<u32>,
     at_end: Vec<u32>,
-    /// Number of pairs of readings that contributed to the noise.
     pairs: u64,
 }
 
 impl HealthWatch {
-    /// A monitor of the channels of a layout.
     pub fn new(layout: &Layout) -> Self {
         let health = |name: &String| ChannelHealth {
             name: name.clone(),
@@ -73,13 +64,11 @@ impl HealthWatch {
         }
     }
 
-    /// Health of each channel.
     pub fn channels(&self) -> &[ChannelHealth] {
         &self.channels
     }
 
-    /// Updates the noise from the last two readings, both untouched: their difference has twice the variance of one reading. The estimate is a mean
-    /// over the last few hundred pairs.
+    /// The difference of untouched readings has twice the variance. Averages a few hundred pairs.
     pub fn learn_noise(&mut self) {
         self.pairs += 1;
         let weight = 1.0 / self.pairs.min(300) as f64;
@@ -90,7 +79,6 @@ impl HealthWatch {
         }
     }
 
-    /// Processes the next reading.
     pub fn add(&mut self, reading: &[f64], mut tell: impl FnMut(Event)) {
         self.before.clone_from(&self.last);
         for (value, _) in reading.iter().zip(&self.is_raw).filter(|(_, is_raw)| **is_raw) {
@@ -131,7 +119,6 @@ impl HealthWatch {
 mod tests {
     use super::*;
 
-    /// Final state of the first of two raw channels after these readings.
     fn last_state(readings: impl IntoIterator<Item = [f64; 2]>) -> ChannelState {
         let mut watch = HealthWatch::new(&Layout::even(SensorKind::Raw, 2, 0.1));
         readings.into_iter().for_each(|reading| watch.add(&reading, |_| {}));

@@ -1,27 +1,23 @@
-//! A low-pass filter of readings that come at irregular times.
+//! Low-pass filter for irregular times.
 
 use palpate_numerics::OutOfRange;
 use std::f64::consts::TAU;
 
-/// Range of cut-off frequencies, in hertz.
 const RANGE_HZ: std::ops::RangeInclusive<f64> = 1e-6..=1e9;
-/// The range in text.
 const RANGE_IN_WORDS: &str = "at least 0.000001 Hz and at most 1000000000 Hz";
 
-/// A first-order low-pass filter, like a resistor and a capacitor.
+/// First-order low-pass filter: y ← x + (y − x)·exp(−T/τ), with the reading x, the time T since the last one,
+/// and τ = 1/(2π·f).
 ///
-/// With τ = 1/(2π·f), f the cut-off frequency, T the time since the previous reading and x the reading, the filtered reading is
-/// y ← x + (y − x)·exp(−T/τ). This is exact for readings that stay constant between two instants, for any time between them.
-/// For independent noise of readings at a steady rate, the standard deviation is multiplied by √(α/(2 − α)), α = 1 − exp(−T/τ).
+/// It multiplies the standard deviation of independent noise by √(α/(2 − α)), α = 1 − exp(−T/τ).
 #[derive(Clone, Debug)]
 pub struct LowPass {
     time_constant_s: f64,
-    /// The filtered reading, and the time of the last reading in ns since 1970; `None` before the first.
     state: Option<(Vec<f64>, u64)>,
 }
 
 impl LowPass {
-    /// A filter in its initial state, with this cut-off frequency in hertz: 1e-6 to 1e9.
+    /// Creates a filter with a cut-off frequency of 1e-6 to 1e9 Hz.
     ///
     /// # Errors
     /// [`OutOfRange`].
@@ -31,19 +27,17 @@ impl LowPass {
         Ok(Self { time_constant_s: 1.0 / (TAU * cutoff_hz), state: None })
     }
 
-    /// Discards all readings: the next one passes unchanged.
     pub fn reset(&mut self) {
         self.state = None;
     }
 
-    /// The filtered reading after the next one. The values of `reading` are finite, in the order of the channels. The time `unix_ns` is in
-    /// nanoseconds since 1970, and later than that of the previous reading.
+    /// Filters a finite reading; its time in ns increases.
     pub fn filter(&mut self, unix_ns: u64, reading: &[f64]) -> &[f64] {
         let (filtered, last_ns) = self.state.get_or_insert_with(|| (reading.to_vec(), unix_ns));
         let step_s = unix_ns.saturating_sub(*last_ns) as f64 * 1e-9;
         let kept = (-step_s / self.time_constant_s).exp();
         for (filtered, value) in filtered.iter_mut().zip(reading) {
-            // The sum is weighted, because the difference of very large values may be infinite.
+            // A weighted sum, because the difference of very large values may be infinite.
             *filtered = kept * *filtered + (1.0 - kept) * value;
         }
         *last_ns = unix_ns;
@@ -58,7 +52,6 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
-    /// τ of 10 Hz, in seconds.
     const TAU_S: f64 = 0.1 / TAU;
 
     fn ns(time_s: f64) -> u64 {

@@ -1,4 +1,4 @@
-//! A session: bytes with instants in; readings, estimates and events out.
+//! Sessions: from bytes to readings, estimates and events.
 
 mod contact;
 mod estimation;
@@ -32,19 +32,19 @@ use timeline::{GapKind, Timeline};
 /// Configuration of a session.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SessionConfig {
-    /// Treatment of offsets that have moved since calibration.
+    /// Tare.
     pub tare: TareMode,
-    /// Estimation method, from tared readings to estimates.
+    /// Estimation method.
     pub estimation: Estimation,
 }
 
-/// Treatment of offsets that have moved since calibration.
+/// Treatment of moved offsets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TareMode {
-    /// The baseline is estimated, and followed while the surface is untouched, if the locator can detect untouched readings.
+    /// Tracked, if the locator detects untouched readings.
     #[default]
     Auto,
-    /// The baseline stays until the user tares.
+    /// Constant until a tare.
     Manual,
 }
 
@@ -57,16 +57,16 @@ pub enum Output {
     Event(EventRecord),
 }
 
-/// Numbers of arrived readings and frames.
+/// Counts of readings and frames.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Counters {
-    /// Readings that were located.
+    /// Located readings.
     pub readings: u64,
-    /// Frames that contained no valid reading, by cause.
+    /// Bad frames by cause.
     pub bad_frames: BTreeMap<BadFrame, u64>,
-    /// Frames that the board sent but that did not arrive, if the board numbers its frames.
+    /// Lost frames, if the board numbers its frames.
     pub lost_frames: u64,
-    /// Stretches without readings.
+    /// Gaps without readings.
     pub gaps: u64,
 }
 
@@ -84,17 +84,15 @@ pub struct Session<'a> {
     repeats: RepeatWatch,
     lost_frames: u64,
     gaps: u64,
-    /// Number of the next reading.
     number: u64,
-    /// True after a reading of status `no_contact`.
     was_untouched: bool,
 }
 
 impl<'a> Session<'a> {
-    /// A session in its initial state.
+    /// Creates a session.
     ///
     /// # Errors
-    /// [`SessionError`] for a locator that the tracker cannot use, if the session tracks, or a frequency out of range.
+    /// [`SessionError`].
     pub fn new(locator: &'a Locator, config: &SessionConfig) -> Result<Self, SessionError> {
         let channels = Channel::all_of(&locator.setup);
         let extent = locator.setup.surface().extent();
@@ -116,10 +114,11 @@ impl<'a> Session<'a> {
         })
     }
 
-    /// Sets the columns of frames without names: every channel, time (`t`, `ms`, `us`), number of the frame (`n`), and others, which are ignored.
+    /// Sets the columns of frames without names: channels, time (`t`, `ms`, `us`), sequence number (`n`);
+    /// others are ignored.
     ///
     /// # Errors
-    /// [`ColumnsError`] unless every channel is named once.
+    /// [`ColumnsError`].
     pub fn set_columns(&mut self, columns: &[String]) -> Result<(), ColumnsError> {
         self.frames.set_columns(columns)
     }
@@ -129,7 +128,7 @@ impl<'a> Session<'a> {
         &self.channels
     }
 
-    /// Numbers of arrived readings and frames.
+    /// Counts of readings and frames.
     pub fn counters(&self) -> Counters {
         Counters {
             readings: self.frames.readings(),
@@ -149,12 +148,12 @@ impl<'a> Session<'a> {
         self.health.channels()
     }
 
-    /// Readings a second, over the last second with readings.
+    /// Readings per second over the last second.
     pub fn rate_hz(&self) -> f64 {
         self.timeline.rate_hz()
     }
 
-    /// Processes an arrival from a source.
+    /// Processes an arrival.
     pub fn receive(&mut self, arrived: &Arrived, out: &mut Vec<Output>) {
         let at = arrived.at;
         if let Some(by_s) = self.timeline.look_at_clock(at) {
@@ -179,7 +178,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Executes a user's command.
+    /// Executes a command.
     pub fn command(&mut self, at: Stamp, command: Command, out: &mut Vec<Output>) {
         match command {
             Command::Tare => self.taring.begin(),
@@ -189,7 +188,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Processes a reading: time, health, tare, optional filter, estimate, events. `behind` more readings have arrived with it.
+    /// Processes a reading; `behind` more readings arrived with it.
     fn take(&mut self, at: Stamp, frame: Frame, behind: usize, out: &mut Vec<Output>) {
         let at = self.timeline.board_stamp(at, frame.device_time);
         let (unix_ns, gap) = self.timeline.next(at, &frame, behind);
@@ -206,7 +205,7 @@ impl<'a> Session<'a> {
         let is_repeat = self.watch_repeats(time_s, &frame.reading, out);
         let mut tared = frame.reading.clone();
         self.taring.note_time(time_s);
-        // The baseline follows unfiltered readings in every estimation method, because a filtered reading would show a contact late.
+        // The baseline follows unfiltered readings, because a filtered reading would show a contact late.
         let single = if is_repeat {
             let single = self.taring.locate_repeat(self.locator, &frame.reading, &mut tared);
             single.map(|single| (single, false))
@@ -245,7 +244,7 @@ impl<'a> Session<'a> {
         })));
     }
 
-    /// True for a reading that a board repeats because it sends faster than it measures. The first detection adds an event.
+    /// True for a repeated reading, if the board sends faster than it measures.
     fn watch_repeats(&mut self, time_s: f64, reading: &[f64], out: &mut Vec<Output>) -> bool {
         let before = self.repeats.is_sample_and_hold();
         let is_repeat = self.repeats.add(reading, self.was_untouched);
@@ -261,7 +260,7 @@ impl<'a> Session<'a> {
         out.push(Output::Event(EventRecord { time_s, event }));
     }
 
-    /// True while the last readings show a touch.
+    /// Returns whether the surface is touched.
     pub fn is_touched(&self) -> bool {
         self.contact.is_touched()
     }
@@ -272,7 +271,6 @@ impl<'a> Session<'a> {
     }
 }
 
-/// True for a status with the place of a contact.
 fn touches(status: Status) -> bool {
     matches!(status, Status::Located | Status::Ambiguous)
 }

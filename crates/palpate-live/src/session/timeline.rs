@@ -5,60 +5,51 @@ use crate::frame::Frame;
 use crate::stamp::Stamp;
 use std::time::Duration;
 
-/// Times of the readings of a session.
 #[derive(Debug, Default)]
 pub struct Timeline {
-    /// Wall clock at the start, less the monotonic clock, in ns. Later times are relative to it, so that they never go back.
+    /// Wall − monotonic clock at the start; relative times never decrease.
     base_ns: Option<i128>,
-    /// Wall clock less the monotonic clock at the last call of `look_at_clock`, in ns.
     seen_ns: i128,
     last_ns: u64,
-    /// Time at which the last reading was taken, if it is known.
     last_taken: Option<Duration>,
     last_arrival: Option<Duration>,
     last_sequence: Option<u32>,
     device_clock: DeviceClock,
-    /// Clock of the board, for a stream with an arbitrary pace; `None` for other streams.
+    /// Set for streams of any rate.
     board: Option<BoardPace>,
-    /// Arrival at which the present second began, and the number of readings since.
     second: Option<(Duration, u32)>,
     rate_hz: f64,
 }
 
-/// Gap: a time without readings.
+/// A time without readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gap {
-    /// Length in seconds.
     pub seconds: f64,
-    /// Frames that the board sent in it, if it numbers its frames.
     pub lost_frames: Option<u32>,
-    /// Kind of the gap.
     pub kind: GapKind,
 }
 
-/// Kind of a gap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GapKind {
-    /// Frames of a continuing stream were lost.
+    /// Lost frames of a continuing stream.
     LostFrames,
     /// No reading for longer than [`GAP_S`] and [`GAP_PERIODS`].
     Silence,
 }
 
-/// A larger change of the wall clock, in ns, means that the clock was set; slewing changes it by less.
+/// Change in ns that exceeds slewing.
 const SET_NS: i128 = 500_000_000;
-/// Shortest silence that is a gap, in seconds, and its length in periods of the readings.
+/// Shortest silence, in seconds and in periods of the readings.
 const GAP_S: f64 = 0.5;
 const GAP_PERIODS: f64 = 5.0;
 
 impl Timeline {
-    /// Nanoseconds since 1970 of an instant.
     pub fn unix_ns(&self, at: Stamp) -> u64 {
         let base_ns = self.base_ns.unwrap_or_else(|| offset_ns(at));
         u64::try_from(base_ns + at.elapsed.as_nanos() as i128).unwrap_or(0)
     }
 
-    /// Seconds by which the wall clock was set since the last call; `None` if it was not set.
+    /// Seconds by which the wall clock was set.
     pub fn look_at_clock(&mut self, at: Stamp) -> Option<f64> {
         let offset_ns = offset_ns(at);
         if self.base_ns.is_none() {
@@ -70,13 +61,11 @@ impl Timeline {
         (by_ns.abs() > SET_NS).then_some(by_ns as f64 * 1e-9)
     }
 
-    /// Uses the time of the board's clock from now on, if frames contain it: the stream may have any pace.
     pub fn follow_board(&mut self) {
         self.board = Some(BoardPace::default());
     }
 
-    /// The instant of a reading with this time of the board's clock. It is the arrival, or follows from the board's clock for a stream with an
-    /// arbitrary pace.
+    /// Time of the board's clock, if followed, else the arrival.
     pub fn board_stamp(&mut self, at: Stamp, device_time: Option<Duration>) -> Stamp {
         match (&mut self.board, device_time) {
             (Some(board), Some(device)) => {
@@ -89,8 +78,7 @@ impl Timeline {
         }
     }
 
-    /// Time of the next reading in ns since 1970, later than that of the previous one, and the gap before it; `behind` more frames have arrived
-    /// with it.
+    /// Returns the increasing time in ns since 1970, and a preceding gap; `behind` more frames arrived.
     pub fn next(&mut self, at: Stamp, frame: &Frame, behind: usize) -> (u64, Option<Gap>) {
         let gap = self.gap(at.elapsed, frame.sequence);
         if gap.is_some_and(|gap| gap.kind == GapKind::Silence) {
@@ -110,15 +98,13 @@ impl Timeline {
         (self.last_ns, gap)
     }
 
-    /// Time between frames without time stamps that arrived together, as through USB: this one and `behind` more. They are distributed evenly over
-    /// the time since the last reading, but no further apart than usual.
+    /// Frames that arrived together, as through USB, are evenly spaced, at most by the usual period.
     fn period(&self, at: Duration, behind: usize) -> Duration {
         let since = self.last_taken.map_or(Duration::ZERO, |last| at.saturating_sub(last));
         let even = since.div_f64(behind as f64 + 1.0);
         if self.rate_hz > 0.0 { even.min(Duration::from_secs_f64(1.0 / self.rate_hz)) } else { even }
     }
 
-    /// Readings a second.
     pub fn rate_hz(&self) -> f64 {
         self.rate_hz
     }
@@ -142,7 +128,7 @@ impl Timeline {
         })
     }
 
-    /// Readings a second since the present second began: infinite if several arrived at one instant, and 0 for one reading.
+    /// Rate in the current second: infinite for several readings at one instant.
     fn rate_so_far_hz(&self) -> f64 {
         let Some(((start, count), last)) = self.second.zip(self.last_arrival) else { return 0.0 };
         if count == 0 { 0.0 } else { f64::from(count) / last.saturating_sub(start).as_secs_f64() }
@@ -163,10 +149,8 @@ impl Timeline {
     }
 }
 
-/// Clock of the board of a stream with an arbitrary pace. The first reading has the time of its arrival, and later ones are relative to it.
 #[derive(Debug, Default)]
 struct BoardPace {
-    /// Board time and instant of the last reading.
     last: Option<(Duration, Duration)>,
 }
 
@@ -198,7 +182,7 @@ mod tests {
         timeline.next(at, &Frame { reading: vec![], sequence: Some(sequence), device_time }, 0)
     }
 
-    /// The times, in ms after the start, of frames without time stamps that arrive in bursts: (ms of the arrival, number of frames).
+    /// Times of bursts: (ms of the arrival, number of frames).
     fn burst_times_ms(bursts: impl IntoIterator<Item = (u64, usize)>) -> Vec<f64> {
         let mut timeline = Timeline::default();
         let mut times_ms = Vec::new();
@@ -234,7 +218,8 @@ mod tests {
     fn times_are_those_of_the_board() {
         let mut timeline = Timeline::default();
         let start_ns = next(&mut timeline, 1000, 0, 50).0;
-        // Late by 7 ms, then on time, then late again: at most a tenth of the delay remains, because the clock may drift.
+        // Late by 7 ms, on time, then late again: at most a tenth of the delay remains, because the clock may
+        // drift.
         for (arrived_ms, number) in [(1017, 1), (1020, 2), (1037, 3)] {
             let device_ms = 50 + 10 * number;
             let at_ns = next(&mut timeline, arrived_ms, number as u32, device_ms).0;
@@ -243,7 +228,6 @@ mod tests {
         }
     }
 
-    /// Gaps before readings that arrive at these times, in ms.
     fn gaps_s(arrivals_ms: impl IntoIterator<Item = u64>) -> Vec<f64> {
         let mut timeline = Timeline::default();
         let gaps = arrivals_ms.into_iter().filter_map(|ms| {

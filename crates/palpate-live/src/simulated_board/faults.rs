@@ -1,4 +1,4 @@
-//! Faults of a simulated board: their configuration, and the loss and tearing of frames.
+//! Faults of a simulated board.
 
 use palpate_estimators::imperfections::Imperfections;
 use palpate_estimators::setup::Setup;
@@ -6,50 +6,43 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::ops::Range;
 
-/// Configuration of the faults of a simulated board; without faults by default.
+/// Configuration of faults; none by default.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FaultConfig {
-    /// Share of frames that are dropped, 0 to 1.
+    /// Share of dropped frames, 0 to 1.
     pub dropped: f64,
-    /// Share of frames with a missing part, 0 to 1.
+    /// Share of torn frames, 0 to 1.
     pub torn: f64,
-    /// Step of the channels' converters, in their SI unit or raw; replaces the resolution of the sensors.
+    /// Step of the converters in SI units or raw, in place of the sensors' resolution.
     pub converter_step: Option<f64>,
-    /// Imperfections of the bench. Their schedule is not used, because a board sends all the time.
+    /// Imperfections of the bench, without their schedule.
     pub imperfections: Imperfections,
 }
 
 impl FaultConfig {
-    /// Imperfections of a setup, without faults of the transmission.
+    /// Returns the imperfections of a setup, without faults of transmission.
     pub fn of_setup(setup: &Setup) -> Self {
         let imperfections = setup.imperfections().copied().unwrap_or_default();
         Self { imperfections, ..Self::default() }
     }
 }
 
-/// Fate of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Fate {
-    /// The frame is sent whole.
     Whole,
-    /// A part of the bytes of the frame is missing.
     Torn {
         /// Range of the missing bytes.
         lost: Range<usize>,
     },
-    /// The frame is not sent.
     Dropped,
 }
 
-/// Faults of the transmission from the board.
 pub struct Faults {
-    /// Configuration of the faults.
     pub config: FaultConfig,
     rng: Xoshiro256PlusPlus,
 }
 
 impl Faults {
-    /// Faults of this configuration, drawn with a seed.
     pub fn new(config: FaultConfig, seed: u64) -> Self {
         // This random stream is independent of those of the noise and the finger.
         Self { config, rng: Xoshiro256PlusPlus::seed_from_u64(seed ^ 0xFA_0175) }

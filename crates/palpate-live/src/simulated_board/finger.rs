@@ -1,4 +1,4 @@
-//! The finger that touches a simulated board: at random, by a script, or under the control of a stage.
+//! Finger on a simulated board.
 
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
@@ -6,7 +6,7 @@ use palpate_rig::Rig;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// A finger that touches, slides and lifts at random.
+/// Finger with random touches, a script, or control by a stage.
 #[derive(Clone, Debug)]
 pub struct Finger {
     rng: Xoshiro256PlusPlus,
@@ -15,22 +15,21 @@ pub struct Finger {
     typical_n: f64,
     touch: Touch,
     script: Option<Vec<Waypoint>>,
-    /// Contact set by a stage, or lifted; `None` without control by a stage.
+    /// `Some(None)` if lifted.
     held: Option<Option<Contact>>,
 }
 
-/// Waypoint of a script: a time, and the contact then; lifted without a contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Waypoint {
     time_s: f64,
     contact: Option<Contact>,
 }
 
-/// An invalid line of a script.
+/// Error of a line of a script.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("line {line} of the script, `{text}`: {problem}")]
 pub struct ScriptError {
-    /// Number of the line, from 1.
+    /// Line, from 1.
     pub line: usize,
     /// Text.
     pub text: String,
@@ -38,7 +37,6 @@ pub struct ScriptError {
     pub problem: &'static str,
 }
 
-/// A touch that slides from one place to another.
 #[derive(Clone, Copy, Debug)]
 struct Touch {
     from: Position,
@@ -49,16 +47,13 @@ struct Touch {
 }
 
 impl Finger {
-    /// Shortest and longest time between touches, in seconds.
     const LIFTED_S: (f64, f64) = (0.8, 2.0);
-    /// Shortest and longest duration of a touch, in seconds.
     const TOUCH_S: (f64, f64) = (1.5, 5.0);
-    /// Time in which the force rises, and in which it falls, in seconds.
     const PRESS_S: f64 = 0.1;
-    /// Share of the side at either edge that is not touched.
+    /// Untouched share of a side.
     const MARGIN: f64 = 0.05;
 
-    /// A finger on the surface of a rig, with the force of the rig if it is known, else with forces around that of its calibration rows.
+    /// Creates a finger with random touches, of the rig's force or around that of its calibration rows.
     pub fn random(rig: &Rig, seed: u64) -> Self {
         let typical_n = rig.training.as_ref().and_then(|training| training.force_n).unwrap_or(1.0);
         let nowhere = Position::default();
@@ -77,7 +72,7 @@ impl Finger {
         finger
     }
 
-    /// The contact at a time in seconds, which must not decrease; `None` while the surface is untouched.
+    /// Returns the contact at a time in seconds, which must not decrease.
     pub fn contact_at(&mut self, time_s: f64) -> Option<Contact> {
         if let Some(held) = self.held {
             return held;
@@ -103,11 +98,10 @@ impl Finger {
         Some(Contact { position, force_n: force_n * pressed.max(1e-3) })
     }
 
-    /// Makes the finger follow a script: lines of `time,x,y,force` in s, mm and N. The finger moves evenly from line to line. A force of 0 lifts it. A
-    /// first line without numbers, such as a heading, is skipped.
+    /// Sets a script `time,x,y,force` in s, mm and N, interpolated linearly; a force of 0 lifts.
     ///
     /// # Errors
-    /// [`ScriptError`] for the first line that does not have this form, has a time that does not increase, or is off the surface.
+    /// An invalid line.
     pub fn with_script(mut self, text: &str) -> Result<Self, ScriptError> {
         let mut script: Vec<Waypoint> = Vec::new();
         for (i, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
@@ -132,16 +126,15 @@ impl Finger {
         Ok(self)
     }
 
-    /// True for a command to the finger: a line that begins with `finger`, `lift` or `reset`.
+    /// Returns whether a line is a command to a finger.
     pub fn knows(line: &str) -> bool {
         matches!(line.split_whitespace().next(), Some("finger" | "lift" | "reset"))
     }
 
-    /// Executes a command of a stage: `finger x y force` in mm and N presses there until the next command, `lift` lifts the finger, `reset` ends the
-    /// control by the stage.
+    /// Executes `finger x y force` in mm and N, `lift`, or `reset` to random touches.
     ///
     /// # Errors
-    /// The problem of the command, in words.
+    /// The problem.
     pub fn obey(&mut self, line: &str) -> Result<(), &'static str> {
         let words: Vec<&str> = line.split_whitespace().collect();
         match words.as_slice() {
@@ -159,12 +152,12 @@ impl Finger {
         Ok(())
     }
 
-    /// Typical force of a touch, in newtons.
+    /// Typical force in newtons.
     pub fn typical_n(&self) -> f64 {
         self.force_n.unwrap_or(self.typical_n)
     }
 
-    /// Sets the contact by a stage, or lifts the finger.
+    /// Sets the contact by a stage.
     pub fn hold(&mut self, contact: Option<Contact>) {
         self.held = Some(contact);
     }
@@ -204,7 +197,6 @@ impl Finger {
     }
 }
 
-/// Contact of a script at a time: linearly interpolated between two waypoints on the surface, else that of the last waypoint.
 fn scripted(script: &[Waypoint], time_s: f64) -> Option<Contact> {
     let next = script.partition_point(|waypoint| waypoint.time_s <= time_s);
     let last = script.get(next.checked_sub(1)?)?;
@@ -221,7 +213,6 @@ fn scripted(script: &[Waypoint], time_s: f64) -> Option<Contact> {
     Some(Contact { position, force_n: between(from.force_n, to.force_n) })
 }
 
-/// Smooth rise from 0 to 1.
 fn smooth(share: f64) -> f64 {
     let share = share.clamp(0.0, 1.0);
     share * share * (3.0 - 2.0 * share)

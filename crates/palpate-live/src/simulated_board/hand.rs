@@ -1,4 +1,4 @@
-//! A hand that follows a guided calibration with human imperfections: it misses the place, presses slowly, hovers, taps and lifts early.
+//! Hand in a guided calibration, with human imperfections.
 
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
@@ -9,37 +9,37 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 /// Instruction to a hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Instruction {
-    /// Press here, with this force.
+    /// Press with this force.
     Press(Contact),
-    /// Keep the present state.
+    /// Keep the state.
     Hold,
-    /// Lift the hand.
+    /// Lift.
     Lift,
 }
 
-/// Manner in which a hand presses.
+/// Style of a hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandStyle {
-    /// Standard deviation of the place on either axis, in metres.
+    /// Standard deviation of the position per axis in metres.
     pub placement_m: f64,
-    /// Time in which the force rises, in seconds.
+    /// Rise time of the force in seconds.
     pub press_s: f64,
-    /// Time in which the force falls, in seconds.
+    /// Fall time of the force in seconds.
     pub lift_s: f64,
-    /// Reaction time to an instruction, in seconds.
+    /// Reaction time in seconds.
     pub reaction_s: f64,
-    /// Share of the force with which the hand hovers before and after each press; 0 without hovering.
+    /// Share of the force while hovering around a press.
     pub hover_share: f64,
-    /// Duration of hovering, in seconds.
+    /// Duration of hovering in seconds.
     pub hover_s: f64,
-    /// Number of quick taps before each press.
+    /// Quick taps per press.
     pub taps: u32,
-    /// Share of presses that the hand lifts before their reading is at rest, 0 to 1.
+    /// Share of presses that end too early, 0 to 1.
     pub early_lift: f64,
 }
 
 impl Default for HandStyle {
-    /// A hand that presses exactly and quickly.
+    /// A hand that is exact and quick.
     fn default() -> Self {
         Self {
             placement_m: 0.0,
@@ -54,9 +54,8 @@ impl Default for HandStyle {
     }
 }
 
-/// Duration of a tap, and of the pause after it, in seconds.
 const TAP_S: f64 = 0.12;
-/// Time after the onset at which an early lift begins, in seconds.
+/// Time from the onset.
 const EARLY_LIFT_S: f64 = 0.15;
 
 /// A hand in the course of a calibration.
@@ -72,7 +71,7 @@ pub struct Hand {
     presses: bool,
 }
 
-/// A part of a motion: the share of the force changes to `share` within `for_s`.
+/// Change to `share` within `for_s`.
 #[derive(Clone, Copy, Debug)]
 struct Leg {
     for_s: f64,
@@ -80,7 +79,7 @@ struct Leg {
 }
 
 impl Hand {
-    /// A lifted hand over a surface.
+    /// Returns a lifted hand.
     pub fn new(style: HandStyle, extent: Extent, seed: u64) -> Self {
         Self {
             style,
@@ -94,7 +93,7 @@ impl Hand {
         }
     }
 
-    /// Contact of a hand with this instruction at a time in seconds, which must not decrease.
+    /// Returns the contact at a time in seconds, which must not decrease.
     pub fn contact_at(&mut self, time_s: f64, instruction: Instruction) -> Option<Contact> {
         if self.is_over(time_s) {
             let share = self.share_at(time_s);
@@ -156,7 +155,6 @@ impl Hand {
         time_s - self.begun_s >= self.motion.iter().map(|leg| leg.for_s).sum()
     }
 
-    /// Share of the force at a time: smooth between the ends of the legs.
     fn share_at(&self, time_s: f64) -> f64 {
         let mut left_s = time_s - self.begun_s;
         let mut from = match self.motion.first() {
@@ -173,7 +171,6 @@ impl Hand {
         from
     }
 
-    /// A place on the surface near the requested one.
     fn beside(&mut self, position: Position) -> Position {
         let mut off = |at_m: f64, side_m: f64| {
             let drawn: f64 = StandardNormal.sample(&mut self.rng);

@@ -1,4 +1,4 @@
-//! A board without hardware: simulates sensors under a surface, a finger that touches it, and the frames of the firmware.
+//! Simulated board.
 
 mod faults;
 mod finger;
@@ -24,35 +24,35 @@ use std::time::Duration;
 /// Configuration of a simulated board.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoardConfig {
-    /// Readings per second, greater than 0.
+    /// Readings per second, positive.
     pub rate_hz: f64,
-    /// Seed of the sensors' faults and noise.
+    /// Seed of noise and faults.
     pub seed: u64,
-    /// A load cell under the finger; its force is the last value of every frame.
+    /// Load cell, with the last value of each frame.
     pub load_cell: Option<LoadCell>,
     /// Form of the frames.
     pub frames: FrameForm,
 }
 
-/// Form of the frames of a simulated board.
+/// Form of frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum FrameForm {
     /// Lines of text.
     #[default]
     Text,
-    /// Binary frames, with the number of the frame and the time by the board's clock.
+    /// Binary frames with sequence number and time.
     Binary {
-        /// Relative error by which the clock is fast, in millionths.
+        /// Clock error in parts per million.
         clock_ppm: f64,
     },
 }
 
-/// Load cell of a simulated machine.
+/// Simulated load cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadCell {
-    /// Name of the values.
+    /// Name of its values.
     pub name: String,
-    /// Standard deviation of the noise in newtons.
+    /// Noise in newtons.
     pub noise_n: f64,
 }
 
@@ -62,7 +62,7 @@ impl Default for BoardConfig {
     }
 }
 
-/// A simulated board, which makes the bytes of its frames from the time.
+/// Generator of the frames of a board.
 pub struct SimulatedBoard<'a> {
     bench: SimulatedBench<'a>,
     extent: Extent,
@@ -72,29 +72,28 @@ pub struct SimulatedBoard<'a> {
     rate_hz: f64,
     load_cell: Option<(LoadCell, Xoshiro256PlusPlus)>,
     frames: FrameForm,
-    /// Last reading and force at the load cell, which frames can repeat.
+    /// Frames can repeat it.
     measured: (Vec<f64>, f64),
-    /// Number of frames so far.
     count: u64,
     sent: Sent,
 }
 
-/// Numbers of frames of a board by their fate.
+/// Counts of frames.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sent {
-    /// Frames that were sent whole.
+    /// Whole frames.
     pub whole: u64,
-    /// Frames that were dropped.
+    /// Dropped frames.
     pub dropped: u64,
-    /// Frames with a missing part.
+    /// Torn frames.
     pub torn: u64,
 }
 
 impl<'a> SimulatedBoard<'a> {
-    /// A board on the bench of a setup, with the imperfections of the setup, touched by a finger.
+    /// Creates a board on the bench of a setup.
     ///
     /// # Errors
-    /// [`SimulateError`] for a surface without a model, or one with equations that are not solved.
+    /// [`SimulateError`].
     pub fn new(setup: &'a Setup, config: &BoardConfig, finger: Finger) -> Result<Self, SimulateError> {
         let faults = FaultConfig::of_setup(setup);
         let bench = SimulatedBench::perfect_watched(setup, config.seed, Watch::NONE)?;
@@ -120,10 +119,10 @@ impl<'a> SimulatedBoard<'a> {
         })
     }
 
-    /// Replaces the faults of the setup with these; the seed draws dropped and torn frames.
+    /// Replaces the faults of the setup.
     ///
     /// # Errors
-    /// [`SimulateError`] for a number out of range.
+    /// [`SimulateError`].
     pub fn with_faults(mut self, config: FaultConfig, seed: u64) -> Result<Self, SimulateError> {
         config.imperfections.check(self.extent)?;
         if let Some(step) = config.converter_step {
@@ -139,17 +138,17 @@ impl<'a> SimulatedBoard<'a> {
         Duration::from_secs_f64(self.count as f64 / self.rate_hz)
     }
 
-    /// Numbers of frames so far, by their fate.
+    /// Counts of frames.
     pub fn sent(&self) -> &Sent {
         &self.sent
     }
 
-    /// The finger, for a stage that moves it.
+    /// Finger.
     pub fn finger_mut(&mut self) -> &mut Finger {
         &mut self.finger
     }
 
-    /// The bytes of all frames that are due by `elapsed` since the start.
+    /// Returns the frames until `elapsed` since the start.
     pub fn send_until(&mut self, elapsed: Duration) -> Vec<u8> {
         let mut bytes = Vec::new();
         while self.next_at() <= elapsed {
@@ -158,7 +157,7 @@ impl<'a> SimulatedBoard<'a> {
         bytes
     }
 
-    /// The bytes of the next frame, whole or torn; `None` for a dropped frame.
+    /// Next frame; `None` if dropped.
     pub fn next_frame(&mut self) -> Option<Vec<u8>> {
         let time_s = self.next_at().as_secs_f64();
         let contact = self.finger.contact_at(time_s);
@@ -183,7 +182,6 @@ impl<'a> SimulatedBoard<'a> {
         Some(frame)
     }
 
-    /// A reading with the noise of the sensors and the load cell.
     fn measure(&mut self, values: &[f64], contact: Option<Contact>) -> (Vec<f64>, f64) {
         let reading = self.bench.measure(values);
         let noise_n = self.load_cell.as_mut().map_or(0.0, |(cell, rng)| {
@@ -193,8 +191,8 @@ impl<'a> SimulatedBoard<'a> {
         (reading, contact.map_or(0.0, |contact| contact.force_n) + noise_n)
     }
 
-    /// The bytes of the reading in the units of the channels, to seven digits. With a load cell, its force is the last value, and lines of text have
-    /// names, so readers of the channels alone can find them.
+    /// Frame with values in channel units, to seven digits. A load cell requires names, so that readers find
+    /// the channels.
     fn frame(&mut self, time_s: f64) -> Vec<u8> {
         let (reading, force_n) = &self.measured;
         let mut values: Vec<f32> = reading

@@ -1,4 +1,4 @@
-//! Alarms by rules, which can be replaced during a session.
+//! Alarms by replaceable rules.
 
 use super::{Batch, Sink};
 use crate::event::Event;
@@ -8,7 +8,7 @@ use crate::session::Output;
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Alarm rules, shared by the sessions and the code that sets the rules.
+/// Alarm rules, shared by sessions.
 #[derive(Clone, Debug)]
 pub struct Alarms(Arc<Mutex<RuleWatch>>);
 
@@ -29,14 +29,14 @@ impl Alarms {
     }
 }
 
-/// Sink that raises alarms as events of the session.
+/// Sink that raises alarms as events.
 pub struct AlarmSink {
     alarms: Alarms,
     reports: SyncSender<Input>,
 }
 
 impl AlarmSink {
-    /// A sink that sends its alarms to the session through `reports`.
+    /// Creates a sink; `reports` receives alarms.
     pub fn new(alarms: Alarms, reports: SyncSender<Input>) -> Self {
         Self { alarms, reports }
     }
@@ -54,7 +54,7 @@ impl Sink for AlarmSink {
             watch.add(output, |rule| {
                 if let Action::Alarm(text) = &rule.action {
                     let alarm = Command::Alarm { name: rule.name.clone(), text: text.clone() };
-                    // The queue of a session that is behind its source is full; the counters of the session show this.
+                    // A full queue means that the session is behind its source, which its counters show.
                     let _ = self.reports.try_send(Input::Command(alarm));
                 }
             });

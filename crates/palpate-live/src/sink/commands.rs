@@ -1,4 +1,4 @@
-//! Commands of rules to the board of the session.
+//! Commands of rules to a board.
 
 use super::{Batch, Sink};
 use crate::commander::{Commander, SendError};
@@ -9,22 +9,19 @@ use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 
-/// Most commands per period, and the length of the period. Further commands are not sent, so a rule that acts too often cannot overload the board.
+/// Most commands per [`STRETCH`], which protects the board.
 const MOST: u32 = 50;
 const STRETCH: Duration = Duration::from_secs(1);
 
-/// Sends the commands of rules to the board.
+/// Sink that sends the commands of rules.
 pub struct CommandSink {
     rules: RuleWatch,
     to: Commander,
     reports: SyncSender<Input>,
-    /// Start of the present period, and number of its commands.
     stretch: (Instant, u32),
-    /// Cause for which the last command was not sent; `None` if it was sent.
     trouble: Option<Unsent>,
 }
 
-/// Cause for which a command was not sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 enum Unsent {
     #[error(transparent)]
@@ -34,8 +31,7 @@ enum Unsent {
 }
 
 impl CommandSink {
-    /// A sink for rules that send commands; other rules have no effect. An unsent command is reported to the session through `reports`. A repeated
-    /// cause is reported once, until a command is sent again.
+    /// Creates a sink; `reports` receives new causes of unsent commands.
     pub fn new(rules: Rules, to: Commander, reports: SyncSender<Input>) -> Self {
         Self { rules: RuleWatch::new(rules), to, reports, stretch: (Instant::now(), 0), trouble: None }
     }
@@ -51,7 +47,7 @@ impl CommandSink {
             let unsent = self.send(&line).err();
             if let Some(unsent) = unsent.filter(|unsent| self.trouble != Some(*unsent)) {
                 let text = format!("command `{line}` of rule `{rule}`: {unsent}");
-                // The report is lost if the queue of the session is full.
+                // A full queue of the session loses the report.
                 let _ = self.reports.try_send(Input::Command(Command::Trouble(text)));
             }
             self.trouble = unsent;

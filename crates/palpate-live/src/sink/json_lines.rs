@@ -10,24 +10,23 @@ use std::io::{self, Write};
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, OnceLock};
 
-/// Writes samples and events as lines of JSON immediately.
+/// Sink that writes lines of JSON immediately.
 #[derive(Debug)]
 pub struct JsonLines<W> {
     out: W,
     channels: Vec<Channel>,
     extent: Extent,
     reports: SyncSender<Input>,
-    /// The first write error; the sink does not write after it.
     failed: Arc<OnceLock<io::Error>>,
 }
 
 impl<W: Write> JsonLines<W> {
-    /// A writer of samples of these channels. A write error is reported to the session through `reports`.
+    /// Creates a sink; `reports` receives a write error.
     pub fn new(out: W, channels: &[Channel], extent: Extent, reports: SyncSender<Input>) -> Self {
         Self { out, channels: channels.to_vec(), extent, reports, failed: Arc::default() }
     }
 
-    /// The first write error; empty before it.
+    /// First write error.
     pub fn failed(&self) -> Arc<OnceLock<io::Error>> {
         Arc::clone(&self.failed)
     }
@@ -55,7 +54,7 @@ impl<W: Write + Send> Sink for JsonLines<W> {
             return;
         }
         if let Err(error) = self.write(batch) {
-            // It is not a problem if the reader has gone.
+            // A closed pipe is expected.
             if error.kind() != io::ErrorKind::BrokenPipe {
                 let text = format!("samples are not printed any longer: {error}");
                 let _ = self.reports.try_send(Input::Command(Command::Trouble(text)));

@@ -23,10 +23,10 @@ use serde::Serialize;
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 
-/// Outputs from one arrival, in their order; shared by all sinks.
+/// Outputs of one arrival, shared by all sinks.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Batch {
-    /// The outputs.
+    /// Outputs in order.
     pub outputs: Vec<Output>,
 }
 
@@ -48,46 +48,46 @@ impl Batch {
     }
 }
 
-/// State of a session, sent about sixty times per second.
+/// State of a session, sent at 60 Hz.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct StateRecord {
-    /// Name of the source, while it is available.
+    /// Name of the connected source.
     pub source: Option<String>,
     /// Readings per second.
     pub rate_hz: f64,
-    /// True while the surface is touched.
+    /// True if touched.
     pub touched: bool,
-    /// Numbers of readings, frames and losses.
+    /// Counts of readings and frames.
     pub counters: Counters,
-    /// State of each channel, in the order of a reading.
+    /// State of each channel.
     pub channels: Vec<ChannelRecord>,
 }
 
-/// State of a channel as a record, in the unit of the board.
+/// State of a channel in board units.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChannelRecord {
     /// State.
     pub state: ChannelState,
-    /// Lowest and highest value so far.
+    /// Lowest and highest value.
     pub range: Option<[f64; 2]>,
-    /// Standard deviation of the noise of a reading.
+    /// Standard deviation of the noise.
     pub noise_sd: f64,
 }
 
-/// A sink. It must not block: outputs that it cannot take at once go into a bounded queue, or are counted as lost.
+/// Receiver of outputs, which must not block.
 pub trait Sink: Send {
-    /// Takes a batch, which is not empty.
+    /// Receives a batch.
     fn batch(&mut self, batch: &Arc<Batch>);
 
-    /// Takes the state of the session.
+    /// Receives the state.
     fn state(&mut self, state: &Arc<StateRecord>) {
         let _ = state;
     }
 }
 
-/// Opens a sink for each new session, for samples of these channels on a surface of this extent. Problems are reported to the session.
+/// Factory of sinks.
 ///
 /// # Errors
-/// The system gives no thread for the sink.
+/// The system provides no thread.
 pub type OpenSink =
     Box<dyn Fn(&[Channel], Extent, SyncSender<Input>) -> std::io::Result<Box<dyn Sink>> + Send + Sync>;

@@ -1,4 +1,4 @@
-//! Estimates and events as MQTT messages.
+//! MQTT messages of estimates and events.
 
 use super::{Batch, Sink};
 use crate::address::Address;
@@ -20,22 +20,22 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// A broker, and the topic of the messages of a session.
+/// URL of a broker with a topic.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MqttUrl {
-    /// The broker.
+    /// Broker.
     pub broker: Address,
-    /// User name and password, if the broker requires them.
+    /// User name and password.
     pub login: Option<Login>,
-    /// The topic.
+    /// Topic.
     pub topic: String,
 }
 
-/// Text that is not the URL of a broker with a topic.
+/// Error of a URL.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{text}` is not a broker with a topic, as in `mqtt://user@host:1883/bench/contact`: {problem}")]
 pub struct MqttUrlError {
-    /// The text.
+    /// Text.
     pub text: String,
     /// Problem.
     pub problem: String,
@@ -64,7 +64,7 @@ impl FromStr for MqttUrl {
     }
 }
 
-/// The URL without user name and password.
+/// The URL without the login.
 impl fmt::Display for MqttUrl {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "mqtt://{}/{}", self.broker, self.topic)
@@ -72,7 +72,6 @@ impl fmt::Display for MqttUrl {
 }
 
 impl MqttUrl {
-    /// Options of a client with a unique identity.
     pub(crate) fn options(&self, role: &str) -> Result<MqttOptions, LoginError> {
         static NUMBER: AtomicU64 = AtomicU64::new(0);
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
@@ -87,17 +86,13 @@ impl MqttUrl {
     }
 }
 
-/// Most batches that wait for the thread of the sink.
 const WAITING: usize = 1024;
-/// Most messages that wait for the broker; further ones are counted as lost.
 const MESSAGES: usize = 1024;
-/// Time between two attempts to reach a broker.
 const AGAIN_AFTER: Duration = Duration::from_millis(500);
-/// Longest wait at the end until the broker has taken the last message.
 const PATIENCE: Duration = Duration::from_millis(150);
 
-/// Publishes samples to `TOPIC/estimate` and events to `TOPIC/event`. The retained message of `TOPIC/status` is `online`, or `offline` once the
-/// session has ended or died.
+/// Sink that publishes samples to `TOPIC/estimate`, events to `TOPIC/event`, and the retained `online` or
+/// `offline` to `TOPIC/status`.
 pub struct MqttSink {
     to: Option<SyncSender<Arc<Batch>>>,
     lost: Arc<AtomicU64>,
@@ -105,11 +100,10 @@ pub struct MqttSink {
 }
 
 impl MqttSink {
-    /// A client of a broker, which may become available later. It also publishes the messages of rules. Problems are reported to the session through
-    /// `reports`.
+    /// Creates a client of a broker, which may be offline; `reports` receives problems.
     ///
     /// # Errors
-    /// The system gives no thread for the sink.
+    /// The system provides no thread.
     pub fn new(
         url: &MqttUrl,
         channels: &[Channel],
@@ -127,7 +121,7 @@ impl MqttSink {
         Ok(Self { to: Some(to), lost, thread: Some(thread) })
     }
 
-    /// Number of messages that the broker did not take; counted until the sink has ended.
+    /// Number of lost messages, counted until the end.
     pub fn lost(&self) -> Arc<AtomicU64> {
         Arc::clone(&self.lost)
     }
@@ -154,9 +148,7 @@ impl Drop for MqttSink {
 struct Publisher {
     client: Client,
     topic: String,
-    /// True while the broker is connected.
     online: Arc<AtomicBool>,
-    /// True once the connection has ended permanently.
     done: Arc<AtomicBool>,
     lost: Arc<AtomicU64>,
 }
@@ -212,7 +204,7 @@ impl Publisher {
         }
     }
 
-    /// Publishes the message of a rule. While the broker is away, the message waits for its return.
+    /// The message waits for a disconnected broker.
     fn act(&self, rule: &Rule) {
         let Action::Publish { topic, message } = &rule.action else { return };
         if self.client.try_publish(topic, QoS::AtLeastOnce, false, message.as_bytes()).is_err() {
@@ -237,7 +229,7 @@ impl Publisher {
     }
 }
 
-/// Keeps the connection in a separate thread, because it waits for the broker.
+/// Connection in a separate thread, because it waits for the broker.
 struct Driver {
     client: Client,
     status: String,
@@ -249,7 +241,7 @@ struct Driver {
 
 impl Driver {
     fn run(self, mut connection: Connection) {
-        // True if the broker was available at the last event; `None` before the first.
+        // True if the broker was available at the last event.
         let mut was_there = None;
         for event in connection.iter() {
             match event {

@@ -1,4 +1,4 @@
-//! `file:recording.mcap?speed=1`: the readings of a recording, as the board sent them.
+//! `file:recording.mcap?speed=1`: a recording.
 
 use super::{Outlet, SourceError};
 use crate::input::Arrival;
@@ -7,12 +7,10 @@ use std::fmt::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Longest sleep between two checks that the source is still in use.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// Bytes of an arrival in playback without waits.
 const BURST: usize = 1 << 12;
 
-/// Opens a recording. The readings come at `speed` times the pace of the recording, or with 0 as fast as the session processes them.
+/// Opens a recording for a replay at `speed`; 0 is the fastest.
 pub fn open(outlet: Outlet, path: &Path, speed: f64) -> Result<(), SourceError> {
     let playback = Playback::open(path)?;
     let name = format!("the recording {}", path.display());
@@ -24,7 +22,6 @@ pub fn open(outlet: Outlet, path: &Path, speed: f64) -> Result<(), SourceError> 
     Ok(())
 }
 
-/// Sends the content of the recording; false once the receiver is gone.
 fn run(outlet: &Outlet, mut playback: Playback, speed: f64) -> bool {
     let start = Instant::now();
     let mut first_ns = None;
@@ -58,7 +55,6 @@ fn run(outlet: &Outlet, mut playback: Playback, speed: f64) -> bool {
     }
 }
 
-/// Sleeps until `due` after the start; false once the receiver is gone.
 fn sleep_until(outlet: &Outlet, start: Instant, due: Duration) -> bool {
     loop {
         let left = due.saturating_sub(start.elapsed());
@@ -72,7 +68,7 @@ fn sleep_until(outlet: &Outlet, start: Instant, due: Duration) -> bool {
     }
 }
 
-/// Values as a line of numbers that parse back exactly.
+/// Returns a line of numbers that parse back exactly.
 pub fn line(values: &[f64]) -> String {
     let mut line = String::new();
     for value in values {

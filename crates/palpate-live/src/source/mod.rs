@@ -1,4 +1,4 @@
-//! Sources of bytes: boards, networks, files, and a simulated board.
+//! Sources of bytes.
 
 mod file;
 mod mqtt;
@@ -26,39 +26,37 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Longest time between two checks of a source's thread for commands, or its end.
 const LOOK: Duration = Duration::from_millis(10);
-/// First and longest pause between two attempts to open a device; each pause is twice the one before.
+/// First and longest pause; pauses double.
 const PAUSES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(5)];
-/// Timeout of a connection to a host.
 const CONNECT: Duration = Duration::from_secs(2);
 
-/// A source that can never be opened. A missing device is not an error: the source waits for it.
+/// Error of a source; a missing device is awaited.
 #[derive(Debug, thiserror::Error)]
 pub enum SourceError {
-    /// The rig of a simulated board cannot be read.
+    /// The rig cannot be read.
     #[error("cannot read {path}: {error}")]
     Rig {
-        /// Path of the rig.
+        /// Rig.
         path: String,
         /// Cause.
         error: String,
     },
-    /// The rig of a simulated board cannot be simulated.
+    /// The rig cannot be simulated.
     #[error(transparent)]
     Simulate(#[from] palpate_estimators::simulate::SimulateError),
     /// The recording cannot be read.
     #[error(transparent)]
     Recording(#[from] crate::recording::RecordingError),
-    /// The password of a broker cannot be read.
+    /// The password cannot be read.
     #[error(transparent)]
     Login(#[from] crate::login::LoginError),
-    /// The system gives no thread for the source.
+    /// The system provides no thread.
     #[error("no thread for the source: {0}")]
     Thread(#[from] std::io::Error),
 }
 
-/// An open source: a thread that brings arrivals. The thread ends within 100 ms after the source is dropped.
+/// Open source; its thread ends within 100 ms after a drop.
 #[derive(Debug)]
 pub struct Source {
     stop: Arc<AtomicBool>,
@@ -72,7 +70,6 @@ impl Drop for Source {
     }
 }
 
-/// Outlet of a source's thread: takes its arrivals to the session.
 pub(crate) struct Outlet {
     to: SyncSender<Input>,
     clock: HostClock,
@@ -85,13 +82,12 @@ impl Outlet {
         Self { to, clock, stop: Arc::default(), open: Arc::default() }
     }
 
-    /// The source of this outlet, without a way back to the device.
     fn source(&self) -> Source {
         Source { stop: Arc::clone(&self.stop), open: Arc::clone(&self.open), commander: None }
     }
 
-    /// Hands an arrival on with the present instant; false once the source is to end or the session has gone. While the session is behind, this waits,
-    /// and the buffers of the system keep the data of the device.
+    /// Sends an arrival; false at the end of source or session. Waits for a slow session, while the system
+    /// buffers data.
     pub(crate) fn send(&self, arrival: Arrival) -> bool {
         match arrival {
             Arrival::Opened(_) | Arrival::Joined(_) | Arrival::Piped(_) => {
@@ -112,12 +108,10 @@ impl Outlet {
         false
     }
 
-    /// True once the source is to end.
     pub(crate) fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// Waits, unless the source is to end.
     fn pause(&self, pause: Duration) {
         let end = Instant::now() + pause;
         while !self.is_stopped() && Instant::now() < end {
@@ -127,10 +121,10 @@ impl Outlet {
 }
 
 impl Source {
-    /// Opens a source that sends its arrivals to `to`; paths in the URL are relative to `folder`.
+    /// Opens a source that sends to `to`; paths are relative to `folder`.
     ///
     /// # Errors
-    /// [`SourceError`] for a source that can never be opened. A missing device is not an error: the source waits for it.
+    /// [`SourceError`].
     pub fn open(
         url: &SourceUrl,
         folder: &Path,
@@ -140,7 +134,7 @@ impl Source {
         let outlet = Outlet::new(to, clock);
         let mut source = outlet.source();
         let (commander, for_device) = Commander::new(Arc::clone(&source.open));
-        // End of a command line, for a source with a way back.
+        // Line end of commands, for a source that accepts them.
         let mut line_end = None;
         match url.clone() {
             SourceUrl::Stdin => stdin::open(outlet)?,
@@ -167,19 +161,18 @@ impl Source {
         Ok(source)
     }
 
-    /// The way back to the device, for other senders of commands.
+    /// Sender of commands.
     ///
     /// # Errors
-    /// [`SendError::OneWay`] for a source without a way back.
+    /// [`SendError::OneWay`].
     pub fn commander(&self) -> Result<Commander, SendError> {
         self.commander.clone().ok_or(SendError::OneWay)
     }
 
-    /// Sends a command to the device: bytes to a serial port or a TCP server, a message to the topic `TOPIC/command` of an MQTT board.
-    /// Returns at once; the source's thread sends it.
+    /// Queues a command, for MQTT to `TOPIC/command`.
     ///
     /// # Errors
-    /// [`SendError`] for a source without a way back, a device that is away, or too many waiting commands.
+    /// [`SendError`].
     pub fn send(&self, command: &[u8]) -> Result<(), SendError> {
         self.commander.as_ref().ok_or(SendError::OneWay)?.send(command)
     }
@@ -187,7 +180,7 @@ impl Source {
     /// Opens a simulated board on the bench of a rig.
     ///
     /// # Errors
-    /// [`SourceError::Simulate`] for a surface without a model, or one with equations that are not solved.
+    /// [`SourceError::Simulate`].
     pub fn simulated(
         rig: Rig,
         config: BoardConfig,
@@ -205,7 +198,6 @@ fn spawn(run: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
     thread::Builder::new().name("source".to_owned()).spawn(run).map(|_| ())
 }
 
-/// Pauses between attempts to open a device.
 struct BackOff(Duration);
 
 impl BackOff {
@@ -213,7 +205,6 @@ impl BackOff {
         Self(PAUSES[0])
     }
 
-    /// The next pause.
     fn next(&mut self) -> Duration {
         let pause = self.0;
         self.0 = (2 * pause).min(PAUSES[1]);
@@ -221,7 +212,6 @@ impl BackOff {
     }
 }
 
-/// Discards commands that were sent before the device went away.
 fn forget(commands: &Receiver<Vec<u8>>) {
     while commands.try_recv().is_ok() {}
 }

@@ -14,12 +14,10 @@ use std::pin::pin;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
-/// Most bytes of a packet: the maximum of MQTT, because the client drops the connection at a larger packet. A message that is too long for a frame is
-/// cut, and counts as one bad frame.
+/// Limit of MQTT, because the client disconnects beyond it; longer frames are truncated to a bad one.
 const LARGEST: usize = 256 << 20;
-/// User name and password.
 type Credentials = (String, String);
-/// Silence after which the client pings the broker; after twice as much the broker counts as gone. The client allows at least 1 s.
+/// The broker is lost after twice as much. The client requires 1 s.
 const KEEP_ALIVE: Duration = Duration::from_secs(5);
 
 pub fn run(
@@ -91,7 +89,7 @@ async fn bring(
             Err(error) => Some(explain(&broker.to_string(), &error)),
         };
         if let Some(why) = why {
-            // A broker that stays away for one reason is reported once.
+            // Each cause is reported once.
             if why != said && !outlet.send(Arrival::Lost(why.clone())) {
                 return;
             }
@@ -117,7 +115,7 @@ fn connection(broker: &Address, login: Option<Credentials>) -> (AsyncClient, Eve
     (client, events)
 }
 
-/// The next packet of the broker; `None` once the source is to end. Calls `look` repeatedly while it waits.
+/// Waits for a packet, and calls `look` repeatedly.
 async fn next(
     outlet: &Outlet,
     events: &mut EventLoop,

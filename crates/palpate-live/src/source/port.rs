@@ -1,4 +1,4 @@
-//! Serial, TCP and UDP ports: opened, read until they go away, and opened again.
+//! Ports with reconnection: serial, TCP and UDP.
 
 use super::{BackOff, LOOK, Outlet, forget};
 use crate::input::Arrival;
@@ -8,24 +8,22 @@ use std::time::Instant;
 
 /// Most bytes of an arrival.
 pub const CHUNK: usize = 1 << 16;
-/// Timeout of a command to a device.
 const WRITE: std::time::Duration = std::time::Duration::from_millis(50);
 
 /// An open device.
 pub trait Port {
-    /// Waits for the next arrival, at most for [`LOOK`].
+    /// Waits at most [`LOOK`].
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<Arrival>>;
 
-    /// Bytes that wait already when the port is opened; empty if that is unknown.
+    /// Returns the bytes from before the opening, if known.
     fn backlog(&mut self) -> io::Result<Vec<u8>> {
         Ok(Vec::new())
     }
 
-    /// Sends a command.
     fn send(&mut self, command: &[u8]) -> io::Result<()>;
 }
 
-/// Opens a device, hands on its data, and opens it again whenever it goes away. Sends the arrival `opened` after each opening.
+/// Sends `opened` and the data of a device, which is opened again after each loss.
 pub fn run<P: Port>(
     outlet: &Outlet,
     commands: &Receiver<Vec<u8>>,
@@ -53,7 +51,7 @@ pub fn run<P: Port>(
             Err(error) => error,
         };
         let why = error.to_string();
-        // A device that stays away for one reason is reported once.
+        // Each cause is reported once.
         if why != said && !outlet.send(Arrival::Lost(why.clone())) {
             return;
         }
@@ -62,7 +60,6 @@ pub fn run<P: Port>(
     }
 }
 
-/// Hands on the data of an open device until the source is to end; returns the error if the device goes away.
 fn bring(
     outlet: &Outlet,
     commands: &Receiver<Vec<u8>>,
@@ -76,7 +73,8 @@ fn bring(
         }
         match port.receive(&mut buffer) {
             Ok(Some(arrival)) => {
-                // Only data reset the pauses, so a device that goes away at once is not opened ten times a second.
+                // Only data reset the pauses, so that a device that disconnects at once is not opened ten
+                // times a second.
                 *back_off = BackOff::new();
                 if !outlet.send(arrival) {
                     return Ok(());
@@ -90,16 +88,14 @@ fn bring(
     Ok(())
 }
 
-/// True for the error of a read or write that is to be repeated.
 fn is_wait(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted)
 }
 
-/// A stream of bytes with reads and writes that wait at most for [`LOOK`].
+/// A stream with timeouts of [`LOOK`].
 pub struct Stream<T> {
-    /// The stream.
     pub stream: T,
-    /// Error message for the end of the stream.
+    /// Message at the end of the stream.
     pub end: &'static str,
 }
 

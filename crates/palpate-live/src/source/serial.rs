@@ -26,7 +26,7 @@ impl Port for SerialStream {
     }
 
     fn backlog(&mut self) -> io::Result<Vec<u8>> {
-        /// Size of the buffer of drivers; limits the read for a board that sends without a pause.
+        /// Buffer size of drivers, for boards without pauses.
         const MOST: usize = 1 << 20;
         let port = &mut self.0.stream;
         let mut bytes = Vec::new();
@@ -51,7 +51,6 @@ impl Port for SerialStream {
     }
 }
 
-/// An error with its remedy.
 fn complaint(path: &Path, error: serialport::Error) -> io::Error {
     // On Unix systems this kind means that the port is locked.
     let is_busy = cfg!(unix) && error.kind == serialport::ErrorKind::NoDevice;

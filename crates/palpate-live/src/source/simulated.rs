@@ -7,7 +7,7 @@ use palpate_rig::Rig;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Longest time between two arrivals. Readings within it arrive together, as through USB.
+/// Time between arrivals, as through USB.
 const BURST: Duration = Duration::from_millis(1);
 
 pub fn open(outlet: Outlet, path: &Path, rate_hz: f64, seed: u64) -> Result<(), SourceError> {
@@ -18,9 +18,8 @@ pub fn open(outlet: Outlet, path: &Path, rate_hz: f64, seed: u64) -> Result<(), 
     open_rig(outlet, rig, BoardConfig { rate_hz, seed, ..BoardConfig::default() }, name)
 }
 
-/// Opens a simulated board on the bench of a rig.
 pub fn open_rig(outlet: Outlet, rig: Rig, config: BoardConfig, name: String) -> Result<(), SourceError> {
-    // This trial refuses a rig that cannot be simulated before the thread starts.
+    // Rejects a rig that cannot be simulated before the thread starts.
     SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, config.seed))?;
     std::thread::Builder::new().name("source".to_owned()).spawn(move || run(&outlet, &rig, &config, name))?;
     Ok(())

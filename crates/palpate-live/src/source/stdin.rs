@@ -1,10 +1,9 @@
-//! `-`: bytes of the standard input.
+//! `-`: standard input.
 
 use super::Outlet;
 use crate::input::Arrival;
 use std::io::Read;
 
-/// Most bytes of an arrival.
 const CHUNK: usize = 1 << 16;
 
 pub fn open(outlet: Outlet) -> std::io::Result<()> {

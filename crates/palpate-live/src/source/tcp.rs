@@ -1,4 +1,4 @@
-//! `tcp://host:port`: a server that sends frames.
+//! `tcp://host:port`: a server of frames.
 
 use super::port::{self, Stream};
 use super::{Address, CONNECT, LOOK, Outlet};
@@ -10,8 +10,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::thread;
 use std::time::Duration;
 
-/// Keep-alive of TCP: silence before the first probe, time between two probes, and number of unanswered probes after which the server is gone. A board
-/// that loses its power does not close the connection.
+/// Silence, interval and number of probes: a board without power does not close the connection.
 const ALIVE: (Duration, Duration, u32) = (Duration::from_secs(2), Duration::from_secs(1), 3);
 
 pub fn run(outlet: &Outlet, commands: &Receiver<Vec<u8>>, server: &Address) {
@@ -29,8 +28,7 @@ pub fn run(outlet: &Outlet, commands: &Receiver<Vec<u8>>, server: &Address) {
     });
 }
 
-/// Connects to a server. A separate thread looks up the name and waits for the connection. If the source is to end meanwhile, this function does not
-/// wait for the thread.
+/// The thread is abandoned at the end of the source.
 fn connect(outlet: &Outlet, server: &Address) -> io::Result<TcpStream> {
     let (to, from) = sync_channel(1);
     let address = server.clone();

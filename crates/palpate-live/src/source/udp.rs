@@ -29,7 +29,6 @@ impl Port for Datagrams {
         Ok(Some(Arrival::Message(buffer[..count].to_vec())))
     }
 
-    /// Datagrams have no way back: `Source::send` refuses commands.
     fn send(&mut self, _: &[u8]) -> io::Result<()> {
         Ok(())
     }

@@ -10,91 +10,88 @@ use std::str::FromStr;
 /// URL of a source.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SourceUrl {
-    /// `-`: the standard input.
+    /// `-`: standard input.
     Stdin,
-    /// `file:recording.mcap?speed=1`: the readings of a recording.
+    /// `file:recording.mcap?speed=1`: a recording.
     File {
-        /// The recording.
+        /// Recording.
         path: PathBuf,
-        /// Ratio of the pace of the playback to that of the recording; 0 for the fastest playback.
+        /// Speed of the replay; 0 is the fastest.
         speed: f64,
     },
     /// `serial:///dev/ttyACM0?baud=115200`: a serial port.
     Serial {
         /// Path of the port, on Windows its name.
         port: PathBuf,
-        /// Baud rate, in bits per second.
+        /// Bits per second.
         baud: u32,
-        /// Names of the values of frames without names; empty where the values are the channels in their order.
+        /// Names of the values.
         columns: Vec<String>,
     },
-    /// `tcp://host:port`: a server that sends frames to its clients.
+    /// `tcp://host:port`: a server of frames.
     Tcp {
-        /// The server.
+        /// Server.
         server: Address,
-        /// Names of the values of frames that have no names.
+        /// Names of the values.
         columns: Vec<String>,
     },
-    /// `udp://:port`: datagrams to a port of this machine.
+    /// `udp://:port`: datagrams.
     Udp {
-        /// The port, and the local address to bind; all IPv4 addresses if the host is empty.
+        /// Local address; all IPv4 addresses without a host.
         at: Address,
-        /// Names of the values of frames that have no names.
+        /// Names of the values.
         columns: Vec<String>,
     },
-    /// `mqtt://host[:port]/topic`: messages of an MQTT broker.
+    /// `mqtt://host[:port]/topic`: an MQTT broker.
     Mqtt {
-        /// The broker.
+        /// Broker.
         broker: Address,
-        /// User name and password, if the broker requires them.
+        /// User name and password.
         login: Option<Login>,
-        /// The topic, or a filter of topics.
+        /// Topic or filter.
         topic: String,
-        /// Names of the values of frames that have no names.
+        /// Names of the values.
         columns: Vec<String>,
     },
     /// `simulated:rig.toml?rate=1000&seed=0`: a simulated board.
     Simulated {
-        /// The rig to simulate.
+        /// Rig.
         rig: PathBuf,
         /// Readings per second.
         rate_hz: f64,
-        /// Seed of the noise and the finger.
+        /// Seed of noise and finger.
         seed: u64,
     },
 }
 
-/// Default baud rate of a serial port, in bits per second.
 const BAUD: u32 = 115_200;
-/// Greatest baud rate, in bits per second.
 const GREATEST_BAUD: u32 = 20_000_000;
-/// Greatest pace of a recording.
 const FASTEST: f64 = 1e6;
 
-/// Text that is not the URL of a source.
+/// Error of a URL.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SourceUrlError {
-    /// A scheme that no source has.
+    /// Unknown scheme.
     #[error(
         "`{text}` is not a source; sources are `-`, `serial:///dev/ttyACM0?baud=115200`, `tcp://host:port`, `udp://:port`, \
          `mqtt://user@host/topic`, `file:recording.mcap?speed=1` and `simulated:rig.toml?rate=1000`"
     )]
     Scheme {
-        /// The text.
+        /// Text.
         text: String,
     },
-    /// A part that the source does not have, or a value that it cannot take.
+    /// Invalid part or value.
     #[error("`{text}`: {problem}")]
     Parameter {
-        /// The URL.
+        /// URL.
         text: String,
-        /// Problem, and the values allowed.
+        /// Problem, with the allowed values.
         problem: String,
     },
 }
 
 impl SourceUrl {
-    /// Names of the values of frames without names; empty where the values are the channels in their order.
+    /// Names of the values of frames without names; empty for the order of the channels.
     pub fn columns(&self) -> &[String] {
         match self {
             Self::Serial { columns, .. }
@@ -152,7 +149,6 @@ impl SourceUrl {
         Ok(Some(url))
     }
 
-    /// Parameters of this kind of source.
     fn parameters(&self) -> &'static str {
         match self {
             Self::Stdin => "none",
@@ -177,11 +173,9 @@ impl FromStr for SourceUrl {
     }
 }
 
-/// Remaining parameters, as `name=value`.
 struct Query<'a>(Vec<&'a str>);
 
 impl<'a> Query<'a> {
-    /// Removes and parses a parameter, which may be given once.
     fn take<T: FromStr>(
         &mut self,
         name: &str,
@@ -226,7 +220,7 @@ impl<'a> Query<'a> {
     }
 }
 
-/// A topic filter by section 4.7 of MQTT 3.1.1.
+/// Checks a filter by section 4.7 of MQTT 3.1.1.
 fn checked_topic(topic: &str) -> Result<String, String> {
     let last = topic.split('/').count() - 1;
     for (i, level) in topic.split('/').enumerate() {

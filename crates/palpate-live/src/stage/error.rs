@@ -1,16 +1,16 @@
-//! Errors of machines, and their descriptions.
+//! Errors of machines.
 
 use palpate_numerics::OutOfRange;
 use std::fmt;
 use std::io;
 
-/// Failure of a machine.
+/// Error of a machine.
 #[derive(Debug, thiserror::Error)]
 pub enum StageError {
-    /// The line is broken, so that the machine can no longer be reached.
+    /// Broken connection.
     #[error("the line to the machine is broken: {0}")]
     Line(#[from] io::Error),
-    /// The firmware is unknown.
+    /// Unknown firmware.
     #[error(
         "the machine identifies itself neither as Marlin nor as GRBL; its answer is {}; check the baud rate",
         quoted(said)
@@ -19,32 +19,32 @@ pub enum StageError {
         /// Text of the answer.
         said: String,
     },
-    /// An answer or a position is not the expected one, so that the machine was stopped.
+    /// Unexpected answer or position.
     #[error("{doubt}; {finger}")]
     Doubt {
-        /// The reason.
+        /// Reason.
         doubt: Doubt,
-        /// The finger after the stop.
+        /// Finger after the stop.
         finger: Finger,
     },
-    /// A move was requested before homing.
+    /// Move before homing.
     #[error("the machine is not homed")]
     NotHomed,
-    /// A person or a limit stopped the machine.
+    /// Stop by a person or a limit.
     #[error("the machine was stopped; it needs a reset before it moves again")]
     Stopped,
-    /// The link has no reset line, and the setup requires one.
+    /// The link lacks the required reset line.
     #[error("`dtr_reset` needs a serial port: this link has no reset line")]
     NoResetLine,
-    /// A number of the setup is out of range.
+    /// Setup number out of range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
 }
 
-/// Reason to trust neither the machine's answers nor its position.
+/// Reason for a stop: unexpected answer or position.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Doubt {
-    /// A line that is not an answer to the command.
+    /// Unexpected answer.
     #[error("the machine answered {} to `{command}`", quoted(answer))]
     Answer {
         /// The command.
@@ -52,21 +52,21 @@ pub enum Doubt {
         /// The line.
         answer: String,
     },
-    /// An `ok` without the report that the command requests.
+    /// `ok` without the requested report.
     #[error("the machine answered `{command}` without {expected}")]
     NoReport {
         /// The command.
         command: String,
-        /// The report.
+        /// Report.
         expected: &'static str,
     },
-    /// A line outside of any command.
+    /// Line outside of any command.
     #[error("the machine sent {} while no command was under way", quoted(line))]
     Unasked {
-        /// The line.
+        /// Line.
         line: String,
     },
-    /// No answer in time.
+    /// Missing answer.
     #[error("the machine did not answer `{command}` within {seconds} s")]
     Silent {
         /// The command.
@@ -74,34 +74,34 @@ pub enum Doubt {
         /// Seconds of waiting.
         seconds: u64,
     },
-    /// The machine restarted.
+    /// Restart.
     #[error("the machine was reset: it sent {}", quoted(greeting))]
     Restart {
-        /// The line.
+        /// Line.
         greeting: String,
     },
-    /// The reported position differs from the target.
+    /// Position off the target.
     #[error("the machine reports {axis} {reported_mm:.2} mm and was sent to {axis} {target_mm:.2} mm")]
     OffPosition {
         /// `X`, `Y` or `Z`.
         axis: char,
-        /// The target, in mm.
+        /// Target in mm.
         target_mm: f64,
-        /// The reported position, in mm.
+        /// Reported in mm.
         reported_mm: f64,
     },
 }
 
-/// State of the finger after the machine was stopped for a `Doubt`.
+/// Finger after a stop for a `Doubt`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Finger {
-    /// The machine had not moved yet.
+    /// No move so far.
     Unmoved,
-    /// The finger was lifted to the height of travel, and the machine was halted.
+    /// Lifted.
     Lifted,
-    /// The machine was halted with the finger at the height of travel or above.
+    /// At or above the height of travel.
     Up,
-    /// The finger could not be lifted: the machine was halted, and the finger may still press.
+    /// Possibly in contact.
     Unknown,
 }
 
@@ -118,10 +118,9 @@ impl fmt::Display for Finger {
     }
 }
 
-/// Largest number of characters of a quoted line.
 const QUOTED: usize = 80;
 
-/// A machine's line between backticks: control characters and quotes escaped, at most 80 characters.
+/// Escapes a line in backticks, at most 80 characters.
 pub(super) fn quoted(line: &str) -> String {
     let escaped: String = line
         .chars()

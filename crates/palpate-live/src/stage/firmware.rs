@@ -1,24 +1,21 @@
-//! Firmware dialects: the commands to a machine, and the meaning of its lines.
+//! Dialects of firmware.
 
 /// Firmware of a machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Firmware {
-    /// Firmware of most 3-D printers.
+    /// Most 3-D printers.
     Marlin,
-    /// Firmware of most small mills.
+    /// Most small mills.
     Grbl,
 }
 
-/// Meaning of a line that precedes the `ok` of a command.
+/// Meaning of a line before the `ok`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Answer {
-    /// The command is done.
     Ok,
-    /// A report that does not contradict the command.
     Report,
-    /// The machine restarted, and has lost its position.
+    /// Restart without a position.
     Greeting,
-    /// Anything else.
     Unexpected,
 }
 
@@ -38,7 +35,7 @@ impl Firmware {
         }
     }
 
-    /// A command that the firmware answers with `ok` once all earlier moves have ended.
+    /// Command answered after all moves.
     pub(super) const fn wait(self) -> &'static str {
         match self {
             Self::Marlin => "M400",
@@ -46,7 +43,7 @@ impl Firmware {
         }
     }
 
-    /// Settings that moves rely on: millimetres and absolute positions; for GRBL also the first work coordinates and feeds in mm a minute.
+    /// Settings of moves: mm, mm/min, absolute positions, and first work coordinates of GRBL.
     pub(super) const fn settings(self) -> &'static [&'static str] {
         match self {
             Self::Marlin => &["G21", "G90"],
@@ -54,7 +51,7 @@ impl Firmware {
         }
     }
 
-    /// Bytes that halt a machine until it is reset; GRBL reads them even between the bytes of a line.
+    /// Bytes that halt until a reset; GRBL reads them at any time.
     pub(super) const fn halt(self) -> &'static [u8] {
         match self {
             Self::Marlin => b"M112\n",
@@ -62,7 +59,6 @@ impl Firmware {
         }
     }
 
-    /// Meaning of a line that precedes the `ok` of a command.
     pub(super) fn classify(self, line: &str) -> Answer {
         if is_ok(line) {
             return Answer::Ok;
@@ -82,7 +78,7 @@ impl Firmware {
         if is_report { Answer::Report } else { Answer::Unexpected }
     }
 
-    /// True if the machine reports `command` as unknown and quotes it exactly as it was sent, so that it arrived whole.
+    /// True if `answer` quotes `command` as unknown: it arrived whole.
     pub(super) fn does_not_know(self, command: &str, answer: &str) -> bool {
         self == Self::Marlin && answer == format!("echo:Unknown command: \"{command}\"")
     }
@@ -92,7 +88,7 @@ pub(super) fn is_ok(line: &str) -> bool {
     line == "ok" || line.starts_with("ok ")
 }
 
-/// First words of boards: Marlin's `start`, the names of GRBL and its relatives, and causes of a reset.
+/// True for `start`, names of GRBL and its relatives, or causes of a reset.
 fn is_greeting(line: &str) -> bool {
     let lower = line.to_ascii_lowercase();
     let words = lower.trim_start_matches("echo:").trim();
@@ -103,7 +99,7 @@ fn is_greeting(line: &str) -> bool {
         || (words.contains("reset") && !words.starts_with("[msg:"))
 }
 
-/// x, y and z in mm of Marlin's `X:1.00 Y:2.00 Z:3.00 E:0.00 Count X:80 …`.
+/// Parses Marlin's `X:1.00 Y:2.00 Z:3.00 E:0.00 Count X:80 …`.
 pub(super) fn position_mm(line: &str) -> Option<[f64; 3]> {
     let words = line.strip_prefix("ok ").unwrap_or(line);
     if !words.starts_with("X:") {
@@ -118,22 +114,18 @@ pub(super) fn position_mm(line: &str) -> Option<[f64; 3]> {
     Some([axis("X:")?, axis("Y:")?, axis("Z:")?])
 }
 
-/// A status report of GRBL, as `<Idle|MPos:0.000,0.000,0.000|FS:0,0|WCO:0.000,0.000,0.000>`.
+/// GRBL status `<Idle|MPos:0.000,0.000,0.000|FS:0,0|WCO:0.000,0.000,0.000>`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Status<'a> {
-    /// State, without the number behind a colon.
     pub state: &'a str,
-    /// True for a feed hold after the deceleration has ended.
+    /// True after the deceleration.
     pub is_held: bool,
-    /// Position in the machine's own coordinates, in mm.
     pub machine_mm: Option<[f64; 3]>,
-    /// Position in work coordinates, in mm.
     pub work_mm: Option<[f64; 3]>,
-    /// Origin of the work coordinates in the machine's own, in mm.
+    /// Origin of the work coordinates.
     pub offset_mm: Option<[f64; 3]>,
 }
 
-/// The status report in a line; `None` for other lines.
 pub(super) fn status(line: &str) -> Option<Status<'_>> {
     let inner = line.strip_prefix('<')?.strip_suffix('>')?;
     let mut fields = inner.split('|');

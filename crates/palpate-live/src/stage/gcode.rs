@@ -1,9 +1,8 @@
-//! Machines of Marlin or GRBL firmware.
+//! Machines with Marlin or GRBL firmware, which execute G-code (ISO 6983-1).
 //!
-//! Both accept lines of G-code (ISO 6983-1) and answer each with `ok` or an error. A move is answered when it has been parsed, not when it has
-//! ended. Each move is therefore followed by a line that waits: `M400` (Marlin), or a dwell `G4` (GRBL, which finishes earlier moves before a
-//! dwell). Marlin answers `ok` even to lines that it did not execute. An `ok` therefore counts only if no unexpected line precedes it and the
-//! reported position is the target.
+//! An `ok` means that a move was parsed, not that it ended. A second command waits for the end: `M400`
+//! (Marlin), or a dwell `G4` (GRBL). Marlin answers `ok` even to unexecuted lines. Every `ok` therefore
+//! requires expected lines only, and a position at the target.
 
 use super::error::{Doubt, StageError};
 use super::firmware::{Answer, Firmware, position_mm, status};
@@ -17,14 +16,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Way in which a stop acts on a machine.
+/// Effect of a stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stopping {
-    /// In the middle of any move.
+    /// During any move.
     AtOnce,
-    /// By a reset of the board over DTR: its firmware does not read a stop during a move.
+    /// By a DTR reset: the firmware reads no stop during a move.
     ByReset,
-    /// Between two moves: its firmware does not read a stop during a move.
+    /// Between moves, without a reset line.
     BetweenMoves,
 }
 
@@ -44,34 +43,32 @@ impl fmt::Display for Stopping {
     }
 }
 
-/// Time for the first output of a board: one with a boot loader and a memory card takes 10 s.
+/// First output: up to 10 s with a boot loader and memory card.
 const IDENTIFY: Duration = Duration::from_secs(15);
-/// Time after which a silent board is queried.
+/// Silence before a board is queried.
 const GREETING: Duration = Duration::from_secs(3);
-/// Time for an answer that does not depend on a move.
+/// Answer without a move.
 pub(super) const ANSWER: Duration = Duration::from_secs(5);
-/// Time for homing: the slowest printers take two minutes.
+/// Two minutes on the slowest printers.
 const HOMING: Duration = Duration::from_secs(300);
-/// Time limit of a move, in addition to twice its computed duration. It covers acceleration and the moves planned before it.
+/// Added to twice the computed duration, for acceleration and earlier moves.
 const MOVE_MARGIN: Duration = Duration::from_secs(10);
 const LONGEST_MOVE: Duration = Duration::from_secs(3600);
-/// Duration of one piece of a move, if a stop takes effect only at the end of a piece.
+/// Piece of a move, if stops act only between moves.
 const PIECE: Duration = Duration::from_millis(40);
 const MOST_PIECES: f64 = 1e6;
-/// Time for the last output of a machine after a stop.
+/// Last output after a stop.
 const LAST_WORDS: Duration = Duration::from_millis(100);
-/// Silence after which no answer is outstanding.
+/// Silence without an outstanding answer.
 const QUIET: Duration = Duration::from_millis(500);
-/// Extra time after the time limit, in which a line without an end is still read.
 const UNENDING: Duration = Duration::from_millis(100);
-/// Largest number of bytes of a line that is stored, and of text that is quoted.
+/// Limit on a line, and on quoted text.
 const LONGEST: usize = 1024;
-/// Number of GRBL's status reports within which one contains the origin of the work coordinates (`REPORT_WCO_REFRESH_IDLE_COUNT` is 10).
+/// Reports until one has GRBL's origin (`REPORT_WCO_REFRESH_IDLE_COUNT` is 10).
 const OFFSET_REPORTS: usize = 11;
-/// Largest distance between a target and the reported position: `M114` has two decimals, and a step of a belt is 0.0125 mm.
+/// Limit on the position error: `M114` has two decimals, and a belt step is 0.0125 mm.
 pub(super) const TOLERANCE_MM: f64 = 0.05;
 
-/// Reason to interrupt the sequence of work.
 #[derive(Debug)]
 pub(super) enum Fault {
     Line(io::Error),
@@ -86,7 +83,7 @@ impl From<io::Error> for Fault {
     }
 }
 
-/// A machine that presses at places of a surface.
+/// Machine that presses on a surface.
 #[derive(Debug)]
 pub struct GcodeStage<L> {
     pub(super) link: L,
@@ -95,24 +92,20 @@ pub struct GcodeStage<L> {
     stop: Arc<AtomicBool>,
     stopping: Stopping,
     received: VecDeque<u8>,
-    /// Origin of GRBL's work coordinates in machine coordinates.
     work_offset_mm: [f64; 3],
-    /// Last reported position; `None` before homing and after a halt.
+    /// `None` before homing and after a halt.
     pub(super) at_mm: Option<[f64; 3]>,
-    /// Target of the last move.
     pub(super) target_mm: [f64; 3],
-    /// Number of echoes requested so far.
     echoes: u32,
-    /// True from homing on.
     pub(super) has_moved: bool,
     is_halted: bool,
 }
 
 impl<L: StageLink> GcodeStage<L> {
-    /// Connects to a machine, and matches its answers to commands. The machine does not move. Setting `stop` stops it at any time.
+    /// Connects to a machine, without a move. `stop` stops it at any time.
     ///
     /// # Errors
-    /// [`StageError`] if the firmware is unknown, an answer is not the expected one, or a number of the setup is out of range.
+    /// [`StageError`] for an unknown firmware, an unexpected answer, or an invalid setup.
     pub fn connect(link: L, setup: Stage, stop: Arc<AtomicBool>) -> Result<Self, StageError> {
         setup.check()?;
         if setup.dtr_reset && !link.has_dtr() {
@@ -148,22 +141,22 @@ impl<L: StageLink> GcodeStage<L> {
         self.firmware
     }
 
-    /// The way in which a stop acts.
+    /// Effect of a stop.
     pub fn stopping(&self) -> Stopping {
         self.stopping
     }
 
-    /// Moves to the end stops, which determine the position, and lifts the finger to the height of travel.
+    /// Homes, and lifts the finger.
     ///
     /// # Errors
-    /// [`StageError`], including those of its steps.
+    /// [`StageError`].
     pub fn home(&mut self) -> Result<(), StageError> {
         let homed = self.try_to_home();
         self.end_of(homed)?;
         self.lift()
     }
 
-    /// Travels to a position of the surface, at the height of travel.
+    /// Travels at the height of travel.
     ///
     /// # Errors
     /// [`StageError`].
@@ -177,7 +170,7 @@ impl<L: StageLink> GcodeStage<L> {
         self.end_of(gone)
     }
 
-    /// Presses at the current position, to a depth in metres.
+    /// Presses to a depth in metres.
     ///
     /// # Errors
     /// [`StageError`].
@@ -187,7 +180,7 @@ impl<L: StageLink> GcodeStage<L> {
         self.end_of(gone)
     }
 
-    /// Moves by distances along x, y and z, in metres, at the height of travel or above. A move that would end below that height ends there.
+    /// Moves in metres, not below the height of travel.
     ///
     /// # Errors
     /// [`StageError`].
@@ -204,7 +197,7 @@ impl<L: StageLink> GcodeStage<L> {
         self.end_of(gone)
     }
 
-    /// Lowers the finger at the current position, to a z in metres of the machine, but never below the deepest press.
+    /// Lowers the finger to a machine z in metres, not below the deepest press.
     ///
     /// # Errors
     /// [`StageError`].
@@ -214,12 +207,12 @@ impl<L: StageLink> GcodeStage<L> {
         self.end_of(gone)
     }
 
-    /// Position after the last move, in metres of the machine; `None` before homing and after a stop.
+    /// Position in machine coordinates; `None` before homing and after a stop.
     pub fn position_m(&self) -> Option<[f64; 3]> {
         self.at_mm.map(|at_mm| at_mm.map(|at_mm| at_mm * 1e-3))
     }
 
-    /// Lifts the finger to the height of travel.
+    /// Lifts the finger.
     ///
     /// # Errors
     /// [`StageError`].
@@ -228,25 +221,25 @@ impl<L: StageLink> GcodeStage<L> {
         self.end_of(gone)
     }
 
-    /// Reads lines that arrive outside of any command, for the duration of one read. An example is the greeting of a board that was reset.
+    /// Reads lines outside of any command, such as a greeting after a reset.
     ///
     /// # Errors
-    /// [`StageError`] for any line except a report, and if the machine was stopped.
+    /// [`StageError`] after a stop, and for any line except a report.
     pub fn watch(&mut self) -> Result<(), StageError> {
         let watched = self.reject_unasked();
         self.end_of(watched)
     }
 
-    /// Halts the machine if a stop was requested.
+    /// Halts after a requested stop.
     ///
     /// # Errors
-    /// [`StageError::Stopped`] if it was requested; [`StageError::Line`].
+    /// [`StageError::Stopped`] or `Line`.
     pub fn heed_stop(&mut self) -> Result<(), StageError> {
         let heeded = self.check_stop();
         self.end_of(heeded)
     }
 
-    /// Converts the outcome for callers. A `Doubt` stops the machine, and lifts its finger if that is safe.
+    /// After a `Doubt`, stops the machine, and lifts its finger if that is safe.
     fn end_of<T>(&mut self, outcome: Result<T, Fault>) -> Result<T, StageError> {
         outcome.map_err(|fault| match fault {
             Fault::Line(error) => StageError::Line(error),
@@ -279,10 +272,9 @@ impl<L: StageLink> GcodeStage<L> {
         Ok(())
     }
 
-    /// Sends the settings that moves rely on.
     pub(super) fn set(&mut self) -> Result<(), Fault> {
         for setting in self.firmware.settings() {
-            // Marlin without support for inches rejects the command that switches them off.
+            // Marlin without inches rejects the command that disables them.
             self.ask(setting, ANSWER, |firmware, line| {
                 *setting == "G21" && firmware.does_not_know(setting, line)
             })?;
@@ -290,7 +282,7 @@ impl<L: StageLink> GcodeStage<L> {
         Ok(())
     }
 
-    /// Moves straight to the given coordinates, and waits for the end, where the reported position must be the target. G-code uses mm and mm/min.
+    /// Moves straight to `to_mm`, in mm and mm/min, and checks the final position.
     pub(super) fn go(&mut self, to_mm: [Option<f64>; 3], speed_m_per_s: f64) -> Result<(), Fault> {
         self.check_stop()?;
         let from_mm = self.at_mm.ok_or(Fault::NotHomed)?;
@@ -330,7 +322,6 @@ impl<L: StageLink> GcodeStage<L> {
         Ok(())
     }
 
-    /// The position that the machine reports at rest.
     pub(super) fn position(&mut self) -> Result<[f64; 3], Fault> {
         if self.firmware == Firmware::Marlin {
             let mut at_mm = None;
@@ -355,7 +346,7 @@ impl<L: StageLink> GcodeStage<L> {
         }
     }
 
-    /// A status report of GRBL. GRBL answers `?` at any time and without `ok`.
+    /// GRBL answers `?` at any time without `ok`.
     pub(super) fn status_report(&mut self, until: Duration) -> Result<StatusReport, Fault> {
         self.reject_unasked()?;
         self.link.write_all(b"?")?;
@@ -388,10 +379,10 @@ impl<L: StageLink> GcodeStage<L> {
         Ok(())
     }
 
-    /// Waits for a greeting, and queries boards that do not greet. Returns the firmware, or `None` if the answers name neither.
+    /// Firmware from a greeting or queries, if known.
     fn identify(&mut self, said: &mut String) -> Result<Option<Firmware>, Fault> {
         let until = self.link.now() + IDENTIFY;
-        // `M115` is the query of Marlin, `$I` that of GRBL.
+        // Queries of Marlin and GRBL.
         let mut questions = ["M115\n", "$I\n"].into_iter().cycle();
         while self.link.now() < until {
             let until = self.link.now() + GREETING;
@@ -415,7 +406,7 @@ impl<L: StageLink> GcodeStage<L> {
         Ok(None)
     }
 
-    /// Skips all answers to earlier commands, so that the next `ok` belongs to the next command.
+    /// Skips outstanding answers.
     pub(super) fn synchronize(&mut self, time: Duration) -> Result<(), Fault> {
         match self.firmware {
             Firmware::Marlin => self.await_echo(time),
@@ -423,7 +414,7 @@ impl<L: StageLink> GcodeStage<L> {
         }
     }
 
-    /// Requests a unique echo from Marlin: all lines before the echo belong to earlier commands. A firmware without `M118` quotes the command.
+    /// Awaits a unique echo of Marlin; a firmware without `M118` quotes the command.
     fn await_echo(&mut self, time: Duration) -> Result<(), Fault> {
         self.echoes += 1;
         let echo = format!("palpate-{}", self.echoes);
@@ -441,11 +432,11 @@ impl<L: StageLink> GcodeStage<L> {
         if is_silent {
             return Err(Fault::Doubt(Doubt::Silent { command, seconds: time.as_secs() }));
         }
-        // If the echo is missing, the line has been quiet for long enough. The report of the next query then shows whether its `ok` belongs to it.
+        // Without an echo, silence has lasted long enough; the report of the next query verifies its `ok`.
         Ok(())
     }
 
-    /// Waits for silence, then requests GRBL's version, which must come before the `ok`.
+    /// Awaits silence, then GRBL's version before the `ok`.
     fn await_version(&mut self, time: Duration) -> Result<(), Fault> {
         const TRIES: usize = 3;
         for _ in 0..TRIES {
@@ -472,7 +463,6 @@ impl<L: StageLink> GcodeStage<L> {
         Err(Fault::Doubt(Doubt::NoReport { command: "$I".to_owned(), expected: "its version" }))
     }
 
-    /// Determines whether the firmware reads a stop during a move.
     fn learn_stopping(&mut self) -> Result<(), Fault> {
         if self.firmware == Firmware::Grbl {
             return Ok(());
@@ -500,7 +490,7 @@ impl<L: StageLink> GcodeStage<L> {
         self.ask(command, time, |_, _| false)
     }
 
-    /// Sends a command, and waits for its `ok`. `takes` receives every line up to and including the `ok`; it returns true for the requested report.
+    /// Awaits the `ok` of a command. `takes` receives all its lines, and returns true for the report.
     fn ask(
         &mut self,
         command: &str,
@@ -535,7 +525,7 @@ impl<L: StageLink> GcodeStage<L> {
         Ok(self.link.flush()?)
     }
 
-    /// Rejects lines that arrive outside of any command; an `ok` among them would be mistaken for the answer to the next command.
+    /// Rejects lines outside of any command; an `ok` would be mistaken for the next answer.
     fn reject_unasked(&mut self) -> Result<(), Fault> {
         while let Some(line) = self.next_line(self.link.now())? {
             match self.firmware.classify(&line) {
@@ -547,7 +537,7 @@ impl<L: StageLink> GcodeStage<L> {
         Ok(())
     }
 
-    /// The next line of the machine, without its line end; `None` when time is up.
+    /// Next line without its end, if in time.
     pub(super) fn next_line(&mut self, until: Duration) -> Result<Option<String>, Fault> {
         loop {
             while let Some(end) = self.received.iter().position(|byte| *byte == b'\n') {
@@ -566,7 +556,7 @@ impl<L: StageLink> GcodeStage<L> {
         }
     }
 
-    /// Reads the available bytes, and waits no longer than the link does; false if there are none.
+    /// Reads available bytes; false without any.
     fn read(&mut self) -> io::Result<bool> {
         let mut bytes = [0; 256];
         match self.link.read(&mut bytes) {
@@ -575,7 +565,7 @@ impl<L: StageLink> GcodeStage<L> {
                 if self.received.len() < LONGEST {
                     self.received.extend(&bytes[..count]);
                 } else {
-                    // The rest of a line that is too long: only its end counts.
+                    // Only the end of an overlong line counts.
                     self.received.extend(bytes[..count].iter().filter(|byte| **byte == b'\n'));
                 }
                 Ok(true)
@@ -587,7 +577,6 @@ impl<L: StageLink> GcodeStage<L> {
         }
     }
 
-    /// Halts the machine if a stop was requested.
     pub(super) fn check_stop(&mut self) -> Result<(), Fault> {
         if self.is_halted {
             return Err(Fault::Stopped);
@@ -599,7 +588,6 @@ impl<L: StageLink> GcodeStage<L> {
         Err(Fault::Stopped)
     }
 
-    /// Halts the machine until it is reset.
     pub(super) fn halt(&mut self) -> io::Result<()> {
         if std::mem::replace(&mut self.is_halted, true) {
             return Ok(());
@@ -614,8 +602,7 @@ impl<L: StageLink> GcodeStage<L> {
         Ok(())
     }
 
-    /// Discards the last output of the machine after its stop. A connection that is closed with unread bytes is reset, and the stop may be lost
-    /// with it.
+    /// Reads the last output; closing a connection with unread bytes could lose the stop.
     fn hear_out(&mut self) {
         let until = self.link.now() + LAST_WORDS;
         while self.link.now() < until && self.read().is_ok() {
@@ -624,7 +611,6 @@ impl<L: StageLink> GcodeStage<L> {
     }
 }
 
-/// A status report of GRBL with the position in work coordinates.
 pub(super) struct StatusReport {
     pub state: String,
     pub is_held: bool,

@@ -1,4 +1,4 @@
-//! The line to a machine: bytes both ways, a clock, and the reset line of a serial port.
+//! Link to a machine: bytes, clock and reset line.
 
 use super::url::StageUrl;
 use crate::stamp::HostClock;
@@ -6,18 +6,18 @@ use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
-/// Link to a machine; a read ends after some 10 ms at most.
+/// Link to a machine; reads take about 10 ms at most.
 pub trait StageLink: Read + Write + Send {
-    /// Time since some instant.
+    /// Time since an arbitrary instant.
     fn now(&self) -> Duration;
 
-    /// Resets the board by its DTR line; false for links without one.
+    /// Resets the board by DTR; false without DTR.
     ///
     /// # Errors
     /// [`io::Error`] of the port.
     fn reset_by_dtr(&mut self) -> io::Result<bool>;
 
-    /// True for links with a DTR line.
+    /// True for links with DTR.
     fn has_dtr(&self) -> bool;
 }
 
@@ -35,16 +35,15 @@ impl<L: StageLink + ?Sized> StageLink for Box<L> {
     }
 }
 
-/// Longest wait of a link for a byte, and thus the longest delay of a stop.
+/// Longest wait for a byte, thus delay of a stop.
 const READ: Duration = Duration::from_millis(10);
-/// Time limit for writing a command, and for a host to accept a connection.
+/// For a write, or a connection.
 const WRITE: Duration = Duration::from_millis(200);
 const CONNECT: Duration = Duration::from_secs(2);
-/// Time for which DTR is dropped: the capacitor of an Arduino's reset line needs some 10 ms.
+/// Pulse: an Arduino's capacitor needs about 10 ms.
 const DTR: Duration = Duration::from_millis(20);
 
 impl StageUrl {
-    /// Opens the link; the clock provides its time.
     pub(super) fn open(&self, clock: HostClock) -> io::Result<Box<dyn StageLink>> {
         match self {
             Self::Serial { port, baud } => {
@@ -87,7 +86,7 @@ impl Write for SerialLink {
         self.port.write(bytes)
     }
 
-    /// Does nothing: the port has no buffer of its own, and waiting for the transmission would delay a stop.
+    /// The port has no buffer; a wait would delay a stop.
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }

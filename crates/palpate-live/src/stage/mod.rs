@@ -1,8 +1,8 @@
-//! Machines that press by themselves: 3-D printers and mills with G-code firmware.
+//! Machines that press: 3-D printers and mills with G-code firmware.
 //!
-//! A [`GcodeStage`] communicates with a machine over a [`StageLink`]. Every answer must belong to the last command, and the position is compared
-//! after every move. Any mismatch stops the machine, and lifts its finger if that is safe. A [`SimulatedMachine`] reproduces the faults of real
-//! ones.
+//! A [`GcodeStage`] controls a machine over a [`StageLink`], and verifies every answer and position. A
+//! mismatch stops the machine, and lifts its finger if that is safe. A [`SimulatedMachine`] reproduces
+//! faults.
 
 mod error;
 mod firmware;

@@ -1,7 +1,7 @@
-//! Retreat after a `Doubt`: the machine is stopped, its finger is lifted if that is safe, and it is halted until a reset.
+//! Retreat after a `Doubt`: stop, lift if safe, halt until a reset.
 //!
-//! A lift is safe if the machine still answers, and reports a position on the path of its last move. It was then not reset, and the lift increases
-//! its own z.
+//! A lift is safe at a reported position on the last move: the machine was not reset, and the lift increases
+//! its z.
 
 use super::error::{Doubt, Finger};
 use super::firmware::Firmware;
@@ -9,13 +9,11 @@ use super::gcode::{Fault, GcodeStage, TOLERANCE_MM};
 use super::link::StageLink;
 use std::time::Duration;
 
-/// Time limit for the answer of a machine that still runs.
 const LIFE: Duration = Duration::from_secs(2);
-/// Time limit for a feed hold to come to rest, and for the greeting after a reset.
+/// Time for a feed hold, or for a greeting.
 const HOLD: Duration = Duration::from_secs(2);
 
 impl<L: StageLink> GcodeStage<L> {
-    /// Stops the machine because of a `Doubt`, lifts its finger if that is safe, and halts it.
     pub(super) fn retreat(&mut self, doubt: &Doubt) -> Finger {
         if !self.has_moved {
             return Finger::Unmoved;
@@ -24,7 +22,7 @@ impl<L: StageLink> GcodeStage<L> {
         let is_lost = self.at_mm.is_none() || matches!(doubt, Doubt::Restart { .. });
         let lifted = if is_lost { Finger::Unknown } else { self.try_to_lift().unwrap_or(Finger::Unknown) };
         let finger = if was_up { Finger::Up } else { lifted };
-        // If even the halt cannot be sent, the finger stays at its position.
+        // Without a halt, the finger stays.
         match self.halt() {
             Ok(()) => finger,
             Err(_) => Finger::Unknown,
@@ -38,7 +36,7 @@ impl<L: StageLink> GcodeStage<L> {
     fn try_to_lift(&mut self) -> Result<Finger, Fault> {
         match self.firmware {
             Firmware::Marlin => {
-                // `M410` drops all moves; the position remains known.
+                // `M410` drops all moves and keeps the position.
                 self.send("M410")?;
                 self.synchronize(LIFE)?;
             }
@@ -56,7 +54,7 @@ impl<L: StageLink> GcodeStage<L> {
         Ok(Finger::Lifted)
     }
 
-    /// Stops the moves of GRBL by a feed hold. A reset at rest then drops them and keeps the position.
+    /// Stops by a feed hold; a reset at rest then drops the moves, but not the position.
     fn hold(&mut self) -> Result<(), Fault> {
         self.pass_over(LIFE)?;
         let until = self.link.now() + LIFE;
@@ -64,7 +62,7 @@ impl<L: StageLink> GcodeStage<L> {
         match state.as_str() {
             "Idle" => return self.synchronize(LIFE),
             "Run" | "Hold" => {}
-            // After an alarm the position may be lost.
+            // An alarm may lose the position.
             _ => return Err(Fault::Doubt(Doubt::Answer { command: "?".to_owned(), answer: state })),
         }
         self.link.write_all(b"!")?;
@@ -84,14 +82,13 @@ impl<L: StageLink> GcodeStage<L> {
         self.set()
     }
 
-    /// Reads until the line is quiet for the time of a read, at most for `most`.
+    /// Reads until silence, at most for `most`.
     fn pass_over(&mut self, most: Duration) -> Result<(), Fault> {
         let until = self.link.now() + most;
         while self.next_line(self.link.now())?.is_some() && self.link.now() < until {}
         Ok(())
     }
 
-    /// True for a position between the start and the target of the last move.
     fn is_on_way(&self, at_mm: [f64; 3]) -> bool {
         let Some(from_mm) = self.at_mm else { return false };
         let is_between = |at: f64, from: f64, to: f64| {

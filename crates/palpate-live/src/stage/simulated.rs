@@ -1,4 +1,4 @@
-//! A machine without hardware: bytes of G-code in, answers and the contact of its finger out. The caller sets the time.
+//! Simulated machine: G-code in, answers and contact out, in the caller's time.
 
 use super::firmware::Firmware;
 use super::link::StageLink;
@@ -11,68 +11,68 @@ use std::str::FromStr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Greeting of a board when its port is opened.
+/// Greeting at the opening of the port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Greeting {
     /// At once.
     #[default]
     AtOnce,
-    /// After a time in which the board does not read.
+    /// Later; the board does not read until then.
     After(Duration),
-    /// The board continues without a greeting.
+    /// Without a greeting.
     None,
 }
 
 /// Fault of a machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultKind {
-    /// The line is not understood, and not executed.
+    /// The line is unknown.
     Unknown,
-    /// The line does not arrive.
+    /// The line is lost.
     Lost,
-    /// The machine stops answering.
+    /// Answers stop.
     Silence,
-    /// The line is requested again, and not executed.
+    /// The line is requested again.
     Resend,
-    /// The line is not executed, because the machine is not homed any more.
+    /// The machine is not homed, and refuses the line.
     HomeFirst,
-    /// The machine halts with an error.
+    /// Halt with an error.
     Error,
-    /// The machine restarts instead of executing the line.
+    /// Restart instead of the line.
     Reset,
-    /// The machine restarts in the middle of the move.
+    /// Restart during the move.
     ResetMoving,
-    /// An end stop ends the move in its middle.
+    /// End stop during the move.
     Endstop,
-    /// The line is executed, and answered twice.
+    /// Second `ok`.
     ExtraOk,
 }
 
-/// A fault at the `nth` line, from 1, that begins with `line`.
+/// Fault at the `nth` line that begins with `line`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MachineFault {
-    /// The fault.
+    /// Fault.
     pub kind: FaultKind,
     /// Beginning of the line.
     pub line: String,
-    /// Number of such lines, from 1.
+    /// Number of the line, from 1.
     pub nth: u32,
 }
 
 /// Behaviour of a simulated machine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MachineConfig {
-    /// Greeting when its port is opened.
+    /// Greeting.
     pub greeting: Greeting,
-    /// Delay of every answer.
+    /// Delay of answers.
     pub delay: Duration,
-    /// True for a Marlin that reads a stop during a move.
+    /// True for stops during a move (Marlin).
     pub emergency_parser: bool,
-    /// True for moves in real duration; false for moves that end at once.
+    /// True for moves in real duration.
     pub is_paced: bool,
     /// Duration of homing.
     pub homing: Duration,
-    /// Soft end stops of x, y and z, in metres of the machine.
+    /// Limits of x, y and z, in metres of the machine.
     pub soft_limits_m: Option<[(f64, f64); 3]>,
     /// Faults.
     pub faults: Vec<MachineFault>,
@@ -92,7 +92,7 @@ impl Default for MachineConfig {
     }
 }
 
-/// Error of a text that does not describe the behaviour of a machine.
+/// Error of an invalid description.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}` describes no machine; parts, separated by commas, are `no-greeting`, `greeting=12s`, `delay=500ms`, `no-emergency-parser`, `paced`, `homing=90s`, `soft-limit-x=200mm` and a fault with its line, as in `unknown@G1 Z:3`: unknown, lost, silence, resend, home-first, error, reset, reset-moving, endstop or extra-ok"
@@ -161,19 +161,19 @@ fn fault_kind(name: &str) -> Option<FaultKind> {
     })
 }
 
-/// A machine over a surface.
+/// Simulated machine over a surface.
 #[derive(Clone, Debug)]
 pub struct SimulatedMachine {
     state: Arc<Mutex<State>>,
 }
 
 impl SimulatedMachine {
-    /// A machine with a finger that presses with `force_n` at the greatest depth of `setup`.
+    /// Creates a machine; `force_n` acts at the greatest depth.
     pub fn new(firmware: Firmware, setup: Stage, extent: Extent, force_n: f64) -> Self {
         Self::with_config(firmware, setup, extent, force_n, MachineConfig::default())
     }
 
-    /// A machine with the behaviour of `config`.
+    /// Creates a machine with a behaviour.
     pub fn with_config(
         firmware: Firmware,
         setup: Stage,
@@ -213,7 +213,7 @@ impl SimulatedMachine {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The contact of the finger, with a force that grows with the depth. `None` while the finger is in the air.
+    /// Contact of the finger; `None` in air.
     pub fn contact(&self) -> Option<Contact> {
         let state = self.state();
         if !state.is_homed && state.shift_m == [0.0; 3] {
@@ -229,58 +229,58 @@ impl SimulatedMachine {
             .then(|| Contact { position, force_n: state.force_n * depth_m / state.setup.deepest_m() })
     }
 
-    /// Opens the port again, which resets a board that greets.
+    /// Opens the port, which may reset the board.
     pub fn open(&self) {
         self.state().open();
     }
 
-    /// Receives bytes from the host.
+    /// Receives bytes.
     pub fn receive(&self, bytes: &[u8]) {
         self.state().receive(bytes);
     }
 
-    /// Advances to a time since the start; earlier times than the last one are ignored.
+    /// Advances the time, never backwards.
     pub fn advance_to(&self, now: Duration) {
         self.state().advance_to(now);
     }
 
-    /// Answers that are due.
+    /// Takes due answers.
     pub fn take_answers(&self) -> Vec<u8> {
         self.state().take_answers()
     }
 
-    /// True from a stop until the port is opened again.
+    /// True between a stop and the next opening.
     pub fn is_stopped(&self) -> bool {
         self.stopped_at().is_some()
     }
 
-    /// Time of the first stop that took effect since the port was opened.
+    /// Time of the first effective stop since the opening.
     pub fn stopped_at(&self) -> Option<Duration> {
         self.state().stopped_at
     }
 
-    /// True while its finger moves.
+    /// True during a move.
     pub fn is_moving(&self) -> bool {
         self.state().motion.is_some()
     }
 
-    /// Number of faults that occurred.
+    /// Number of faults so far.
     pub fn faults_met(&self) -> usize {
         self.state().faults_met
     }
 
-    /// Number of moves after a fault, or before homing, that do more than lift the finger.
+    /// Number of moves after a fault or before homing, without lifts.
     pub fn doubtful_moves(&self) -> usize {
         self.state().doubtful_moves
     }
 
-    /// A link in virtual time, which advances only while the caller waits for an answer.
+    /// Creates a link in virtual time.
     pub fn link(&self) -> SimulatedLink {
         SimulatedLink { machine: self.clone(), is_waited_for: Duration::from_millis(10) }
     }
 }
 
-/// A link to a simulated machine in virtual time: a read without an answer takes 10 ms.
+/// Link in virtual time: an idle read takes 10 ms.
 #[derive(Clone, Debug)]
 pub struct SimulatedLink {
     machine: SimulatedMachine,
@@ -334,16 +334,13 @@ impl StageLink for SimulatedLink {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
     Ready,
-    /// The machine stays still until a reset; GRBL answers with an error.
     Halted,
-    /// Feed hold (GRBL).
     Held,
-    /// GRBL's lock after an alarm, or before homing.
+    /// After an alarm, or before homing.
     Alarm,
     Silent,
 }
 
-/// A move between two positions, in machine coordinates.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
     from_m: [f64; 3],
@@ -361,29 +358,25 @@ struct State {
     config: MachineConfig,
     now: Duration,
     received: Vec<u8>,
-    /// Lines that were received, but not executed yet.
     lines: VecDeque<String>,
-    /// Bytes of the answers with the time at which they are due.
     answers: VecDeque<(Duration, u8)>,
-    /// Target of the last move in machine coordinates; the position at rest.
     at_m: [f64; 3],
-    /// Difference between the position of the finger and the machine coordinates.
+    /// Finger minus machine coordinates.
     shift_m: [f64; 3],
     motion: Option<Motion>,
-    /// End time of the command that waits, and its answer.
     wait: Option<(Duration, String)>,
     deaf_until: Duration,
     resets_at: Option<Duration>,
     is_homed: bool,
     mode: Mode,
     stopped_at: Option<Duration>,
-    /// Number of matching lines so far, for each fault.
+    /// Number of lines of each fault.
     seen: Vec<u32>,
     faults_met: usize,
     doubtful_moves: usize,
 }
 
-/// Time between two `busy` messages of Marlin.
+/// Interval of `busy` messages.
 const BUSY_EVERY: Duration = Duration::from_secs(2);
 
 impl State {
@@ -396,14 +389,13 @@ impl State {
         self.stopped_at = None;
     }
 
-    /// Restarts at the current position of the finger, as a board does; the port may be open.
     fn reset(&mut self) {
         self.restart(Duration::ZERO);
     }
 
     fn restart(&mut self, boot: Duration) {
         let place_m = self.place_m();
-        // A board assumes that it starts at its origin; if it was never homed, its finger is up.
+        // A board starts at its origin; the finger of an unhomed one is up.
         if self.is_homed || self.shift_m != [0.0; 3] {
             self.shift_m = place_m;
         }
@@ -424,7 +416,6 @@ impl State {
         }
     }
 
-    /// The present position in machine coordinates.
     fn machine_m(&self) -> [f64; 3] {
         let Some(Motion { from_m, to_m, start, end }) = self.motion else { return self.at_m };
         let share = if end > start {
@@ -435,7 +426,6 @@ impl State {
         std::array::from_fn(|axis| from_m[axis] + share * (to_m[axis] - from_m[axis]))
     }
 
-    /// The position of the finger.
     fn place_m(&self) -> [f64; 3] {
         let at_m = self.machine_m();
         std::array::from_fn(|axis| at_m[axis] + self.shift_m[axis])
@@ -526,14 +516,13 @@ impl State {
         }
     }
 
-    /// Ends the move at the current position.
     fn freeze(&mut self) {
         self.at_m = self.machine_m();
         (self.motion, self.wait) = (None, None);
         self.lines.clear();
     }
 
-    /// Executes `M112` or `M410`, which are read during any other command.
+    /// Executes `M112` or `M410`, even during another command.
     fn interrupt(&mut self, line: &str) {
         if self.mode == Mode::Silent {
             // A silent machine may still receive.
@@ -569,7 +558,7 @@ impl State {
         }
     }
 
-    /// A soft reset of GRBL; after a feed hold the position is kept.
+    /// After a feed hold, a reset keeps the position.
     fn soft_reset(&mut self) {
         self.note_stop();
         if self.mode == Mode::Silent {
@@ -599,7 +588,7 @@ impl State {
     fn execute(&mut self, line: &str) {
         match self.mode {
             Mode::Halted if self.firmware == Firmware::Marlin => return,
-            // A silent machine still executes its commands.
+            // A silent machine still executes commands.
             Mode::Silent | Mode::Halted | Mode::Ready | Mode::Held | Mode::Alarm => {}
         }
         match self.due_fault(line) {
@@ -676,7 +665,6 @@ impl State {
         }
     }
 
-    /// The finger stops half-way, while Marlin assumes that it has reached its target.
     fn hit_endstop(&mut self, line: &str) {
         let from_m = self.at_m;
         self.obey(line);

@@ -1,4 +1,4 @@
-//! The thread of a machine: it executes orders, and obeys a stop at any time.
+//! Thread of a machine.
 
 use super::error::StageError;
 use super::firmware::Firmware;
@@ -13,38 +13,38 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::JoinHandle;
 
-/// Work for a machine.
+/// Order to a machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Order {
-    /// Home: move to the end stops.
+    /// Homing.
     Home,
-    /// Travel to a position at the height of travel.
+    /// Travel to a position.
     Travel(Position),
-    /// Travel to a position, and press there.
+    /// Travel and press.
     Press {
-        /// The position.
+        /// Position.
         position: Position,
-        /// The depth.
+        /// Depth in metres.
         depth_m: f64,
     },
-    /// Lift the finger.
+    /// Lift.
     Lift,
-    /// Move by these distances along x, y and z, in metres, at the height of travel or above.
+    /// Move in metres, not below the height of travel.
     Jog([f64; 3]),
-    /// Lower the finger to this z, in metres of the machine, but not below the deepest press.
+    /// Descent to a machine z in metres, not below the deepest press.
     Lower(f64),
 }
 
-/// State of a machine after its work, with its position in metres.
+/// State after an order, and position in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Done {
-    /// The finger is lifted.
+    /// Lifted.
     Up([f64; 3]),
-    /// The finger is below the height of travel.
+    /// Below the height of travel.
     Down([f64; 3]),
 }
 
-/// A machine in a thread of its own. Dropping this during a move stops the machine.
+/// Machine in a thread, stopped if dropped during a move.
 #[derive(Debug)]
 pub struct StageThread {
     firmware: Firmware,
@@ -56,11 +56,10 @@ pub struct StageThread {
 }
 
 impl StageThread {
-    /// Opens the link and connects to the machine; the clock provides the time of the link. Setting `stop` stops the machine at any time, as
-    /// [`Self::stop`] does.
+    /// Connects to the machine; `stop` acts as [`Self::stop`].
     ///
     /// # Errors
-    /// [`StageError`] if the machine is missing, or does not answer.
+    /// [`StageError`] of the connection.
     pub fn open(
         url: &StageUrl,
         stage: Stage,
@@ -76,46 +75,46 @@ impl StageThread {
         Ok(Self { firmware, stopping, orders: Some(orders), done, stop, thread: Some(thread) })
     }
 
-    /// The machine's firmware.
+    /// Firmware.
     pub fn firmware(&self) -> Firmware {
         self.firmware
     }
 
-    /// The way in which a stop acts on the machine.
+    /// Effect of a stop.
     pub fn stopping(&self) -> Stopping {
         self.stopping
     }
 
-    /// Orders work; returns at once.
+    /// Queues an order.
     pub fn order(&self, order: Order) {
         if let Some(orders) = &self.orders {
-            // A thread that has failed has reported its error.
+            // A failed thread has reported its error.
             let _ = orders.send(order);
         }
     }
 
-    /// The outcome of the ordered work, once it is done.
+    /// Outcome of the orders, once done.
     pub fn done(&self) -> Option<Result<Done, StageError>> {
         self.done.try_recv().ok()
     }
 
-    /// Stops the machine during any work. The stop has been sent when this returns.
+    /// Stops the machine at once; the stop is sent on return.
     pub fn stop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         self.join();
     }
 
-    /// Waits until all work is done.
+    /// Waits for all orders.
     ///
     /// # Errors
-    /// [`StageError`] of the last work.
+    /// [`StageError`] of the last order.
     pub fn finish(mut self) -> Result<(), StageError> {
         self.order(Order::Lift);
         self.join();
         self.done.try_iter().try_for_each(|done| done.map(drop))
     }
 
-    /// Ends the thread after the ordered work; the machine stays in its final state.
+    /// Ends the thread after its orders.
     pub fn close(&mut self) {
         self.join();
     }
@@ -144,13 +143,13 @@ fn run(
     loop {
         let done = match orders.try_recv() {
             Ok(order) => obey(&mut machine, order),
-            // Waits for a line for the time of one read, and obeys a stop.
+            // Reads for unexpected lines, and obeys a stop.
             Err(TryRecvError::Empty) => match machine.watch() {
                 Ok(()) => continue,
                 Err(error) => Err(error),
             },
             Err(TryRecvError::Disconnected) => {
-                // The thread may be ended by the stop.
+                // The thread may end because of the stop.
                 let _ = machine.heed_stop();
                 return;
             }

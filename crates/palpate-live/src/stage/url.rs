@@ -5,29 +5,29 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// Address of a machine with Marlin or GRBL firmware.
+/// Address of a machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum StageUrl {
-    /// At a serial port.
+    /// Serial port.
     Serial {
-        /// The port.
+        /// Path of the port.
         port: PathBuf,
         /// Bits a second.
         baud: u32,
     },
-    /// Behind a TCP server, for example a bridge to a serial port.
+    /// TCP server, for example a serial bridge.
     Tcp(Address),
 }
 
-/// Error of a text that is not the address of a machine.
+/// Error of an invalid address.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{text}` is not a machine{problem}; machines are `gcode:serial:///dev/ttyUSB0?baud=115200` and `gcode:tcp://host:port`"
 )]
 pub struct StageUrlError {
-    /// The text.
+    /// Invalid text.
     pub text: String,
-    /// The problem of the text, beginning with `: `; empty if it is unknown.
+    /// Problem after `: `, if known.
     pub problem: String,
 }
 

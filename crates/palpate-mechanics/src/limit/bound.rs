@@ -1,10 +1,8 @@
-//! Fisher information of a few parameters, and the resulting Cramér–Rao bound at one contact.
+//! Fisher information and Cramér–Rao bound at one contact.
 //!
-//! Readings with independent Gaussian noise are divided by the standard deviation of their noise. Their Fisher information is F = JᵀJ.
-//! J contains the derivative of every reading (rows) with respect to every parameter (columns).
-//! No unbiased estimator has a covariance below F⁻¹ (Kay, *Fundamentals of Statistical Signal Processing: Estimation
-//! Theory*, 1993, section 3.9). F itself is never formed: with J = Q·R it is Rᵀ·R. R keeps the digits that
-//! squaring loses where two columns are nearly parallel, as those of force and position near a support.
+//! With J the derivatives of whitened readings by parameters, F = JᵀJ = Rᵀ·R, J = Q·R, and no unbiased
+//! estimator has a covariance below F⁻¹ (Kay, *Fundamentals of Statistical Signal Processing: Estimation
+//! Theory*, 1993, section 3.9). F itself would lose digits.
 
 use std::f64::consts::FRAC_2_PI;
 
@@ -12,24 +10,24 @@ use serde::Serialize;
 
 use palpate_numerics::small::{Ldl, Matrix, add_multiple, dot, principal_variances};
 
-/// The Cramér–Rao bound at one contact, for unbiased estimators.
+/// The Cramér–Rao bound at one contact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bound {
-    /// Least standard deviation of the position along the length, in metres.
+    /// Least standard deviation along the length.
     pub sd_x_m: f64,
-    /// Least standard deviation of the position across the width, in metres; 0 on a one-dimensional surface.
+    /// Least standard deviation across the width; 0 on a line.
     pub sd_y_m: f64,
-    /// Covariance of the errors along and across, in m².
+    /// Covariance of both.
     pub covariance_xy_m2: f64,
-    /// Least standard deviation of the force, in newtons; `None` where the force is known.
+    /// Least standard deviation of the force; `None` if known.
     pub sd_force_n: Option<f64>,
-    /// √(sd_x² + sd_y²): the least root mean square distance of estimate and contact, in metres.
+    /// √(sd_x² + sd_y²).
     pub sd_position_m: f64,
 }
 
 impl Bound {
-    /// The bound of readings with independent noise of variance 1, from their derivatives along and across, per metre, for a
-    /// known force. `None` where they do not determine the position.
+    /// Returns the bound for a known force, from derivatives of whitened readings along and across; `None` if
+    /// undetermined.
     pub fn of_columns(columns: [Vec<f64>; 2]) -> Option<Self> {
         Some(Self::new(inverse_information(columns)?, None))
     }
@@ -45,10 +43,10 @@ impl Bound {
         }
     }
 
-    /// Mean distance of estimate and contact, in metres, for an efficient estimator with Gaussian errors.
+    /// Mean position error of an efficient Gaussian estimator.
     ///
-    /// s₁·√(2/π)·E(1 − s₂²/s₁²), where s₁ ≥ s₂ are the standard deviations along the principal axes and E is the complete
-    /// elliptic integral of the second kind. On a one-dimensional surface s₂ = 0 and E = 1, so it is σ·√(2/π).
+    /// s₁·√(2/π)·E(1 − s₂²/s₁²), with principal standard deviations s₁ ≥ s₂ and the complete elliptic
+    /// integral E.
     pub fn mean_error_m(&self) -> f64 {
         let (xx, yy) = (self.sd_x_m * self.sd_x_m, self.sd_y_m * self.sd_y_m);
         let [larger, smaller] = principal_variances([xx, self.covariance_xy_m2, yy]);
@@ -59,10 +57,9 @@ impl Bound {
     }
 }
 
-/// E(1 − k′²), the complete elliptic integral of the second kind by its complementary modulus 0 ≤ k′ ≤ 1, by the
-/// arithmetic–geometric mean (Abramowitz and Stegun, 17.6.4).
+/// E(1 − k′²) (Abramowitz and Stegun, 17.6.4).
 fn elliptic_e(complement: f64) -> f64 {
-    // As k′ falls to 0, K grows like ln(4/k′) and 1 − Σ shrinks: their product is 1 to rounding long before it is 0/0.
+    // As k′ → 0, the product below tends to 0 · ∞; E is 1 to rounding here.
     if complement < 1e-9 {
         return 1.0;
     }
@@ -78,17 +75,15 @@ fn elliptic_e(complement: f64) -> f64 {
     std::f64::consts::FRAC_PI_2 / a * (1.0 - sum)
 }
 
-/// A column adds no information when the columns before it explain all but this share of its length: numerical derivatives are
-/// precise to 10⁻¹⁰, so the remainder is rounding error.
+/// Largest relative remainder that is rounding: numerical derivatives are precise to 10⁻¹⁰.
 const EXPLAINED: f64 = 1e-9;
 
-/// F⁻¹ for the columns of J, P by P, in their order; `None` where F is singular to rounding.
+/// F⁻¹; `None` if singular to rounding.
 pub(super) fn inverse_information<const P: usize>(mut columns: [Vec<f64>; P]) -> Option<Matrix<P>> {
     let covariance = Ldl::of_root(&orthogonalise(&mut columns)?).inverse();
     covariance.iter().flatten().all(|entry| entry.is_finite()).then_some(covariance)
 }
 
-/// Modified Gram–Schmidt: the columns of J become those of Q, and Rᵀ is returned.
 fn orthogonalise<const P: usize>(columns: &mut [Vec<f64>; P]) -> Option<Matrix<P>> {
     let mut triangle = [[0.0; P]; P];
     for (j, shares) in triangle.iter_mut().enumerate() {
@@ -134,7 +129,6 @@ mod tests {
         assert!((line.mean_error_m() - 2e-3 * (2.0 / PI).sqrt()).abs() < 1e-12);
         let round = Bound::new([[4e-6, 0.0], [0.0, 4e-6]], None);
         assert!((round.mean_error_m() - 2e-3 * (PI / 2.0).sqrt()).abs() < 1e-12);
-        // The first ellipse, rotated.
         let along = Bound::new([[9e-6, 0.0], [0.0, 1e-6]], None);
         let turned = Bound::new([[5e-6, 4e-6], [4e-6, 5e-6]], None);
         assert!((along.mean_error_m() - turned.mean_error_m()).abs() < 1e-12);

@@ -1,4 +1,4 @@
-//! The limit over a whole surface.
+//! The limit over a surface.
 
 use super::zone::Grid;
 use super::{Bound, CramerRaoBound, Force, LimitError, check_force};
@@ -9,9 +9,9 @@ use palpate_numerics::{mean, percentile};
 /// The limit at one position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitPoint {
-    /// Position of the contact.
+    /// Contact position.
     pub position: Position,
-    /// The bound there; `None` where the readings do not determine the position.
+    /// Bound; `None` if undetermined.
     pub bound: Option<Bound>,
 }
 
@@ -39,52 +39,52 @@ pub struct LimitPoint {
 pub struct LimitCurve {
     /// Extent of the surface.
     pub extent: Extent,
-    /// The contact force, in newtons.
+    /// Contact force.
     pub force_n: f64,
     /// Knowledge of the force.
     pub force: Force,
-    /// Positions and bounds; on a line from left to right.
+    /// Positions and bounds.
     pub points: Vec<LimitPoint>,
 }
 
-/// Summary of a curve, over the positions with a bound. Limits are standard deviations.
+/// Summary over the positions with a bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitSummary {
-    /// Mean limit, in metres.
+    /// Mean limit.
     pub mean_m: f64,
-    /// Median limit, in metres.
+    /// Median limit.
     pub median_m: f64,
-    /// Mean over the positions of the mean error of an estimator at the limit (σ·√(2/π) on a line), in metres.
+    /// Mean of [`Bound::mean_error_m`].
     pub mean_error_m: f64,
-    /// Position and value of the smallest limit, in metres.
+    /// Smallest limit.
     pub best: (Position, f64),
-    /// Position and value of the largest limit, in metres.
+    /// Largest limit.
     pub worst: (Position, f64),
     /// Number of positions without a bound.
     pub without: usize,
 }
 
-/// Positions on a surface `every_m` (metres) apart, the first of them `every_m` from the edge.
+/// Returns positions with a spacing, also from the edge.
 ///
 /// # Errors
-/// [`LimitError::Positions`] for no position or more than 100,000.
+/// [`LimitError::Positions`] for none or more than 100,000.
 pub fn positions_with_spacing(extent: Extent, every_m: f64) -> Result<Vec<Position>, LimitError> {
     Ok(Grid::with_spacing(extent, every_m)?.positions)
 }
 
 impl LimitCurve {
-    /// The limit all over the surface: on a line at 399 positions, 1/400 of the length apart.
+    /// Computes the limit over the surface, on a line at 1/400 of the length apart.
     ///
     /// # Errors
-    /// [`LimitError::Force`] for a force that is not positive and finite.
+    /// [`LimitError::Force`].
     pub fn over_surface(limit: &CramerRaoBound, force_n: f64, force: Force) -> Result<Self, LimitError> {
         Self::at_positions(limit, force_n, force, &Grid::over_surface(limit.extent).positions)
     }
 
-    /// The limit at the given positions, which must be on the surface.
+    /// Computes the limit at given positions.
     ///
     /// # Errors
-    /// [`LimitError::Force`] for a force that is not positive and finite.
+    /// [`LimitError::Force`].
     pub fn at_positions(
         limit: &CramerRaoBound,
         force_n: f64,
@@ -97,7 +97,7 @@ impl LimitCurve {
         Ok(Self { extent: limit.extent, force_n, force, points: positions.iter().map(point).collect() })
     }
 
-    /// `figure` of the bound by x in metres, from left to right; on a plane the mean across the width. NaN where no bound exists.
+    /// x in metres and `figure` of the bound, ascending; on a plane the mean across. NaN without a bound.
     pub fn by_x(&self, figure: impl Fn(&Bound) -> f64) -> Vec<(f64, f64)> {
         let mut points: Vec<&LimitPoint> = self.points.iter().collect();
         points.sort_by(|a, b| a.position.x_m.total_cmp(&b.position.x_m));
@@ -109,7 +109,7 @@ impl LimitCurve {
         columns.map(|column| (column[0].position.x_m, mean(column))).collect()
     }
 
-    /// The positions without a bound as text: "1 of 399 positions, 0.3 %, at 12000 mm"; `None` where all have one.
+    /// Formats positions without a bound: "1 of 399 positions, 0.3 %, at 12000 mm".
     pub fn not_told_in_words(&self) -> Option<String> {
         const MOST_NAMED: usize = 3;
         let places: Vec<String> = self
@@ -127,7 +127,7 @@ impl LimitCurve {
         }
     }
 
-    /// Summary of the curve; `None` where no position has a bound.
+    /// Summarises; `None` without a bound.
     pub fn summary(&self) -> Option<LimitSummary> {
         let mut bounds: Vec<(Position, Bound)> =
             self.points.iter().filter_map(|point| Some((point.position, point.bound?))).collect();

@@ -1,14 +1,10 @@
-//! The limit: the Cramér–Rao bound of contact position and force for a surface, its layout and its noise.
+//! The Cramér–Rao bound of contact position and force, valid for unbiased estimators and small errors.
 //!
-//! Sensor i reads y_i(a, W) plus independent Gaussian noise of variance σ_i² + q_i²/12. Here a is the contact
-//! position, W the force, y_i the sensor's response function, σ_i its noise and q_i its resolution (quantisation as noise
-//! of variance q²/12: Widrow and Kollár, *Quantization Noise*, 2008). On a surface that bends little y_i = W·f_i(a), with the
-//! influence function f_i. For a known force on a line the bound is
-//! 1/√(Σ_i (∂y_i/∂a/σ_i)²). An unknown force is estimated with the position, at the cost of part of that information.
+//! A reading is y_i(a, W) at position a and force W, with noise of variance σ_i² + q_i²/12 (resolution q_i:
+//! Widrow and Kollár, *Quantization Noise*, 2008). For small deflections y_i = W·f_i(a). On a line, for a
+//! known force, the bound is 1/√(Σ_i (∂y_i/∂a/σ_i)²).
 //!
-//! The bound ignores dead channels, and those that are saturated at the contact. It does not include gain and offset errors, which
-//! calibration removes. It is valid for unbiased estimators and small errors. Where it nears the size of the surface, its value means
-//! "blind" and no more. [`LimitWarning`] reports distant contacts with nearly equal readings.
+//! Disabled and saturated channels are ignored.
 
 mod bound;
 mod curve;
@@ -33,13 +29,13 @@ use palpate_numerics::watch::{Cancelled, Watch};
 use responses::Responses;
 use zone::Grid;
 
-/// Knowledge of the contact force: given, or estimated with the position.
+/// Knowledge of the contact force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Force {
-    /// The force is given.
+    /// Given.
     Known,
-    /// The force is estimated together with the position.
+    /// Estimated with the position.
     Unknown,
 }
 
@@ -53,25 +49,22 @@ impl Force {
     }
 }
 
-/// A surface with its active sensors and their noise.
+/// The Cramér–Rao bound of a surface with sensors.
 #[derive(Clone)]
 pub struct CramerRaoBound<'a> {
     extent: Extent,
-    /// The mechanics; `None` for a surface without a model.
     model: Option<&'a dyn Surface>,
     channels: Vec<Channel>,
     responses: Responses<'a>,
-    /// Norm of the whitened readings per newton, with every sensor at its full scale.
+    /// Norm of the whitened readings per newton at full scale.
     full_scale: f64,
 }
 
-/// Share of the full scale below which readings, or their change over the length of the surface, are rounding errors.
+/// Relative size of rounding errors of readings.
 const SILENT: f64 = 1e-9;
 
-/// An active sensor.
 #[derive(Clone)]
 struct Channel {
-    /// Number of the sensor in the layout, from 0.
     index: usize,
     kind: SensorKind,
     /// √(σ² + q²/12).
@@ -80,22 +73,22 @@ struct Channel {
 }
 
 impl<'a> CramerRaoBound<'a> {
-    /// The limit of a surface with the sensors of `layout`, except dead ones.
+    /// Creates the bound for the active sensors of `layout`.
     ///
-    /// For more than 1,500 sensors on a plate no influence functions are stored. Each contact is then solved for, as
-    /// [`CramerRaoBound::prepare`] does for contacts all over the surface.
+    /// On a plate with more than 1,500 sensors, contacts are solved one by one; see
+    /// [`CramerRaoBound::prepare`].
     ///
     /// # Errors
-    /// [`LimitError::Noise`] for an active sensor with neither noise nor resolution, or when no sensor is active; [`LimitError::Surface`] when
-    /// the equations of the surface have no balanced solution.
+    /// [`LimitError::Noise`] for singular noise or no active sensor; [`LimitError::Surface`] without a
+    /// solution.
     pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Result<Self, LimitError> {
         Self::new_watched(surface, layout, Watch::NONE)
     }
 
-    /// The limit as in [`CramerRaoBound::new`], watched during the solutions for the sensors.
+    /// Creates the bound, watched.
     ///
     /// # Errors
-    /// The errors of [`CramerRaoBound::new`], and [`LimitError::Cancelled`].
+    /// As [`CramerRaoBound::new`], and [`LimitError::Cancelled`].
     pub fn new_watched(surface: &'a dyn Surface, layout: &Layout, watch: Watch) -> Result<Self, LimitError> {
         let channel = |(index, (sensor, sd)): (usize, (&Sensor, Option<f64>))| {
             Some(Channel { index, kind: sensor.kind, sd: sd?, range: sensor.channel.range })
@@ -115,8 +108,7 @@ impl<'a> CramerRaoBound<'a> {
         })
     }
 
-    /// The limit of a surface without a model. Each response is that of one channel over the standard deviation of its noise, both from a
-    /// recording.
+    /// Creates the bound of whitened response functions.
     ///
     /// ```
     /// use palpate_mechanics::contact::{Contact, Position};
@@ -157,23 +149,22 @@ impl<'a> CramerRaoBound<'a> {
         Self { extent, model: None, channels, responses, full_scale }
     }
 
-    /// Work and memory of the limit of a surface with the sensors of `layout`, all over it and at `others` further contacts.
+    /// Estimates the cost over a surface and at `others` further contacts.
     pub fn cost(surface: &dyn Surface, layout: &Layout, others: usize) -> LimitCost {
         let alive = layout.sensors().iter().filter(|sensor| !sensor.channel.dead).count();
         Responses::cost(surface, alive, Grid::over_surface(surface.extent()).positions.len() + others)
     }
 
-    /// Solves in advance for contacts all over the surface, which curves and warnings use, and for `others`. Only for many sensors does this
-    /// do any work.
+    /// Solves in advance for contacts over the surface and `others`.
     ///
     /// # Errors
-    /// [`Cancelled`] when the work is to stop.
+    /// [`Cancelled`].
     pub fn prepare(&self, others: &[Position], watch: Watch) -> Result<(), Cancelled> {
         let positions = [&Grid::over_surface(self.extent).positions[..], others].concat();
         self.responses.prepare(&positions, watch)
     }
 
-    /// The extent of the surface.
+    /// Extent of the surface.
     pub fn extent(&self) -> Extent {
         self.extent
     }
@@ -183,9 +174,8 @@ impl<'a> CramerRaoBound<'a> {
         self.channels.len()
     }
 
-    /// The bound at a contact; `None` where the readings do not determine the position: the Fisher information is singular to rounding.
-    /// Reasons are a zero force, the lack of a sensitive sensor, or a change of position that a change of force cancels. Over a
-    /// support the readings respond to no force, so an unknown force is undetermined there, and the position with it.
+    /// Returns the bound at a contact; `None` for singular Fisher information, as over a support with an
+    /// unknown force.
     pub fn bound_at(&self, contact: Contact, force: Force) -> Option<Bound> {
         let Columns { force: by_force, along, across } = self.derivatives(contact);
         let least = SILENT * self.full_scale;
@@ -215,12 +205,11 @@ impl<'a> CramerRaoBound<'a> {
         }
     }
 
-    /// Noise-free reading of each active sensor at a contact, over the standard deviation of its noise.
+    /// Whitened, noise-free reading of the active sensors.
     pub fn whitened_reading(&self, contact: Contact) -> Vec<f64> {
         self.whitened_readings(&[contact.position], contact.force_n).pop().unwrap_or_default()
     }
 
-    /// Whitened readings at several contacts of one force, which are solved for together.
     fn whitened_readings(&self, positions: &[Position], force_n: f64) -> Vec<Vec<f64>> {
         let mut each = self.responses.readings(positions, force_n);
         for readings in &mut each {
@@ -231,17 +220,16 @@ impl<'a> CramerRaoBound<'a> {
         each
     }
 
-    /// Index of each active sensor in the layout, from 0, and the standard deviation of its noise, which whitens its readings.
+    /// Index and noise of each active sensor.
     pub fn noise_sds(&self) -> Vec<(usize, f64)> {
         self.channels.iter().map(|channel| (channel.index, channel.sd)).collect()
     }
 
-    /// Norm of the whitened readings: the signal of a touch in standard deviations of the noise.
+    /// Norm of the whitened readings.
     pub fn signal_to_noise(&self, contact: Contact) -> f64 {
         norm(&self.whitened_reading(contact))
     }
 
-    /// Derivatives of the whitened readings; 0 for saturated channels.
     fn derivatives(&self, contact: Contact) -> Columns {
         let mut columns = Columns::default();
         let mut across = Vec::new();
@@ -261,13 +249,12 @@ impl<'a> CramerRaoBound<'a> {
 }
 
 impl Channel {
-    /// A reading, clamped to the range.
     fn held(&self, reading: f64) -> f64 {
         self.range.map_or(reading, |(low, high)| reading.max(low).min(high))
     }
 }
 
-/// Derivatives of the whitened readings with respect to force, x and, on a plane, y.
+/// Derivatives of the whitened readings.
 #[derive(Default)]
 struct Columns {
     force: Vec<f64>,
@@ -281,13 +268,13 @@ pub enum LimitError {
     /// The surface has no model.
     #[error("a measured surface has no model, and the limit needs influence functions")]
     NoModel,
-    /// The noise is singular, and the limit would be 0; or no sensor is active.
+    /// The noise is singular, or no sensor is active.
     #[error(transparent)]
     Noise(#[from] NoiseError),
-    /// The contact force is not a positive, finite number.
+    /// The force is not positive and finite.
     #[error("the contact force is {force_n} N; it must be greater than 0 and finite")]
     Force {
-        /// The force, in newtons.
+        /// The force.
         force_n: f64,
     },
     /// No force is given.
@@ -301,15 +288,14 @@ pub enum LimitError {
         /// Largest number.
         most: usize,
     },
-    /// The equations of the surface have no balanced solution.
+    /// The surface has no solution.
     #[error("the equations of the surface could not be solved: {0}")]
     Surface(#[from] Unsolvable),
-    /// The watch stopped the work.
+    /// The watch cancelled the work.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
 
-/// Refuses a force that is not positive and finite.
 fn check_force(force_n: f64) -> Result<(), LimitError> {
     if force_n > 0.0 && force_n.is_finite() { Ok(()) } else { Err(LimitError::Force { force_n }) }
 }

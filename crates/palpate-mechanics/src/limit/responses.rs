@@ -1,8 +1,7 @@
-//! Readings of the sensors of a limit under a contact, and their derivatives with respect to its position.
+//! Readings of the sensors under a contact, and their derivatives.
 //!
-//! Each of a few sensors has a response function. For many sensors on a surface of finite elements these functions would fill the memory
-//! and take as many solutions. By reciprocity three solutions for a contact give the readings of all sensors and their derivatives, which
-//! are cached.
+//! For many sensors on finite elements, three reciprocal solutions per contact are faster than response
+//! functions.
 
 use std::collections::HashMap;
 use std::ops::ControlFlow;
@@ -16,48 +15,42 @@ use crate::surface::{
 use palpate_numerics::small::add_multiple;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// Largest number of sensors with response functions: about as many as solutions for the contacts of a whole plane.
+/// Largest number of response functions, about the number of solutions for contacts over a plane.
 const MOST_FUNCTIONS: usize = 1500;
-/// Largest memory of cached contacts, in bytes.
 const MOST_KEPT: usize = 256 << 20;
-/// Sensors that are solved for between two checks of the watch: as many as a plate solves for in one sweep.
+/// Sensors between two checks of the watch: one sweep of a plate's solver.
 const SOLVED_TOGETHER: usize = 24;
-/// Largest memory of readings under loads on degrees of freedom, in bytes.
 const MOST_OF_DEGREES: usize = 192 << 20;
 
-/// Largest number of further solutions in the search for twins, as a multiple of the solutions all over the surface.
+/// Largest number of solutions for twins, relative to those over the surface.
 const MOST_SOLUTIONS: f64 = 12.0;
 
-/// Estimated work and memory of a limit all over a surface.
+/// Estimated cost of a limit over a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitCost {
-    /// Memory, in bytes.
+    /// Memory.
     pub memory_bytes: f64,
-    /// Smallest and largest time of the solutions, in seconds of a core of some 3 GHz. The number of solutions in the search for twins is
-    /// known only at its end.
+    /// Range of the time on a 3 GHz core, which depends on twins.
     pub seconds: [f64; 2],
 }
 
-/// Responses of the active sensors, in their order.
 #[derive(Clone)]
 pub(super) enum Responses<'a> {
     BySensor(Vec<Arc<dyn ResponseFunction + 'a>>),
     ByContact(ByContact<'a>),
 }
 
-/// Influences of all sensors, contact by contact.
 #[derive(Clone)]
 pub(super) struct ByContact<'a> {
     readings: Arc<dyn ReadingsByContact + 'a>,
     sensors: usize,
-    /// Influences by the bits of a contact's position.
+    /// Influences by [`key`].
     kept: Arc<Mutex<HashMap<[u64; 2], Arc<Influences>>>>,
-    /// Readings of all sensors under loads on degrees of freedom, for single contacts near each other.
+    /// Readings by degree of freedom.
     degrees: Arc<Mutex<HashMap<usize, Vec<f64>>>>,
 }
 
 impl<'a> Responses<'a> {
-    /// Responses of the active sensors of a layout.
     pub fn new(surface: &'a dyn Surface, layout: &Layout, watch: Watch) -> Result<Self, Cancelled> {
         Self::with_most_functions(surface, layout, MOST_FUNCTIONS, watch)
     }
@@ -92,7 +85,6 @@ impl<'a> Responses<'a> {
         Ok(Self::BySensor(functions))
     }
 
-    /// Reading of each sensor under a force at each of `positions`.
     pub fn readings(&self, positions: &[Position], force_n: f64) -> Vec<Vec<f64>> {
         match self {
             Self::BySensor(functions) => {
@@ -106,7 +98,6 @@ impl<'a> Responses<'a> {
         }
     }
 
-    /// Reading of each sensor, and its derivatives.
     pub fn gradients(&self, contact: Contact) -> Vec<(f64, ResponseGradient)> {
         match self {
             Self::BySensor(functions) => {
@@ -116,7 +107,6 @@ impl<'a> Responses<'a> {
         }
     }
 
-    /// Work and memory of the responses of `sensors` sensors at `positions` positions, and of their comparison.
     pub fn cost(surface: &dyn Surface, sensors: usize, positions: usize) -> LimitCost {
         let solving = if sensors > MOST_FUNCTIONS { Solving::ByContact } else { Solving::BySensor };
         let reading = (size_of::<f64>() * sensors) as f64;
@@ -140,7 +130,6 @@ impl<'a> Responses<'a> {
         }
     }
 
-    /// Solves for contacts, many at a time, while the cache has room.
     pub fn prepare(&self, positions: &[Position], watch: Watch) -> Result<(), Cancelled> {
         match self {
             Self::BySensor(_) => Ok(()),
@@ -162,7 +151,6 @@ impl ByContact<'_> {
         positions.iter().map(of).collect()
     }
 
-    /// Readings per newton at a contact, from the readings under loads on the degrees of freedom around it.
     fn interpolated(&self, position: Position) -> Vec<f64> {
         let around = self.readings.degrees(position);
         let mut degrees = self.degrees.lock().unwrap_or_else(PoisonError::into_inner);
@@ -217,7 +205,6 @@ impl ByContact<'_> {
         kept.insert(key(position), influences);
     }
 
-    /// Influences at a contact, which are cached while there is room.
     fn solved(&self, position: Position) -> Arc<Influences> {
         let influences = Arc::new(self.readings.influences(&[position]).pop().unwrap_or_default());
         if self.has_room() {
@@ -227,7 +214,6 @@ impl ByContact<'_> {
     }
 }
 
-/// The bits of a position, as a key for caches.
 pub(super) fn key(position: Position) -> [u64; 2] {
     [position.x_m, position.y_m].map(f64::to_bits)
 }

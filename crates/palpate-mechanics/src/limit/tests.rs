@@ -1,4 +1,4 @@
-//! The limit compared with the paper's figures, closed forms, simulation, and symmetries.
+//! The limit compared with closed forms, simulation, and symmetries.
 
 use std::sync::LazyLock;
 
@@ -73,7 +73,6 @@ fn over_a_support_an_unknown_force_is_not_told_and_left_out_of_the_summary() {
     }
 }
 
-/// Texts of some warnings.
 fn words(warnings: &[LimitWarning]) -> String {
     warnings.iter().map(|warning| format!("{warning}\n  would help: {}\n", warning.help())).collect()
 }
@@ -87,7 +86,7 @@ fn the_papers_beam_has_the_limits_that_the_paper_leaves_room_for() {
     for (force, figures) in [(Force::Known, known), (Force::Unknown, unknown)] {
         for (a_mm, limit_mm) in figures {
             let seen = sd_mm(&limit, a_mm, force);
-            // They are given with two digits.
+            // The figures have two digits.
             assert!((seen / limit_mm - 1.0).abs() < 0.04, "{a_mm} mm, {force:?}: {seen}, not {limit_mm}");
         }
     }
@@ -119,12 +118,11 @@ fn two_reactions_give_the_closed_form() {
     }
 }
 
-/// A plane with a bump as the influence function of every sensor: exp(−d²/2w²), with the distance d of sensor and contact.
+/// A plane with influence functions exp(−d²/2w²), with the distance d of sensor and contact.
 struct Pad;
 
 const PAD_WIDTH_M: f64 = 0.02;
 
-/// The influence of a sensor of the [`Pad`] at a position.
 struct Bump(Position);
 
 impl InfluenceFunction for Bump {
@@ -174,7 +172,8 @@ fn a_plane_has_a_bound_in_both_directions() {
     let limit = CramerRaoBound::new(&Pad, &four).unwrap();
     let at =
         |x_m, y_m, force| limit.bound_at(Contact { position: Position { x_m, y_m }, force_n: 2.0 }, force);
-    // In the centre of a symmetric layout the errors of x, y and force are independent: 1/√(Σ (∂y_i/∂x)²) each.
+    // In the centre of a symmetric layout the errors of x, y and force are independent: 1/√(Σ (∂y_i/∂x)²)
+    // each.
     let centre = at(0.03, 0.02, Force::Unknown).unwrap();
     let reading = 2.0 * 1e-4 * (-0.5 * (4e-4 + 1e-4) / 4e-4_f64).exp() / 1e-6;
     let by_x = reading * 0.02 / 4e-4;
@@ -197,7 +196,7 @@ fn a_plane_has_a_bound_in_both_directions() {
     let curve = LimitCurve::at_positions(&limit, 2.0, Force::Known, &positions).unwrap();
     assert_eq!(curve.points.len(), 11 * 7);
     assert_eq!(curve.summary().unwrap().without, 11);
-    // A figure by x is the mean across; every column has a contact on the line, without a bound.
+    // A figure by x is the mean across; every column has a position without a bound.
     let by_x = curve.by_x(|bound| bound.sd_position_m);
     assert_eq!(by_x.len(), 11);
     assert!(by_x.is_sorted_by(|a, b| a.0 < b.0) && by_x.iter().all(|(_, mean)| mean.is_nan()));
@@ -208,8 +207,8 @@ fn a_plane_has_a_bound_in_both_directions() {
     assert_eq!(curve.by_x(|bound| bound.sd_x_m), [(0.03, bounds.sum::<f64>() / 2.0)]);
 }
 
-/// The position with the readings nearest to `reading` (whitened), among positions a hundredth of `step_m` apart around
-/// `near_m`: maximum likelihood for a known model. An unknown force is fitted with the position.
+/// The position with the readings nearest to `reading` (whitened): maximum likelihood, with a fitted force if
+/// it is unknown.
 fn most_likely(limit: &CramerRaoBound, reading: &[f64], near_m: f64, step_m: f64, force: Force) -> f64 {
     let cost = |a_m: f64| {
         let shape = limit.whitened_reading(Contact { position: Position::along(a_m), force_n: 3.0 });
@@ -219,7 +218,7 @@ fn most_likely(limit: &CramerRaoBound, reading: &[f64], near_m: f64, step_m: f64
         };
         shape.iter().zip(reading).map(|(s, r)| (r - scale * s).powi(2)).sum::<f64>()
     };
-    // Golden section search: the cost has one minimum within the few standard deviations of the search.
+    // Golden-section search: the cost has one minimum within a few standard deviations.
     let (mut low, mut high) = (near_m - step_m, near_m + step_m);
     let ratio = 0.5 * (5f64.sqrt() - 1.0);
     while high - low > 1e-4 * step_m {
@@ -254,7 +253,8 @@ fn maximum_likelihood_spreads_as_the_limit_says() {
             .collect();
         let sd_m = (errors.iter().map(|e| e * e).sum::<f64>() / DRAWS as f64).sqrt();
         let mean_m = errors.iter().map(|e| e.abs()).sum::<f64>() / DRAWS as f64;
-        // The standard deviation of 4000 draws is known to 1/√8000 = 1.1 %; the mean error to 1.2 %.
+        // The relative error of the standard deviation of 4000 draws is 1/√8000 = 1.1 %; that of the mean 1.2
+        // %.
         assert!((sd_m / bound.sd_x_m - 1.0).abs() < 0.04, "{a_mm} mm, {force:?}: {}", sd_m / bound.sd_x_m);
         assert!((mean_m / bound.mean_error_m() - 1.0).abs() < 0.045, "{a_mm} mm, {force:?}");
     }

@@ -6,56 +6,48 @@ use super::{Columns, CramerRaoBound, Force};
 use crate::contact::{Contact, Position};
 use palpate_numerics::small::Ldl;
 
-/// Largest distance of the readings of two ambiguous contacts, in standard deviations: a reading is then attributed
-/// to the wrong contact more than once in a hundred times (2·2.326).
+/// Largest distance of ambiguous contacts, in standard deviations: more than 1 of 100 readings are confused
+/// (2·2.326).
 pub(super) const AMBIGUOUS_DISTANCE: f64 = 4.653;
-/// Number of points of the straight line between two contacts at which their difference is computed, from the middle outwards.
 const WAY_POINTS: i32 = 47;
-/// Radius around a position of the grid in which its derivatives predict twins and the search stays, in pitches. Farther away another
-/// position of the grid is nearer, and a search along a valley would end at the contact itself.
+/// Radius of the search, in pitches. Farther away a search along a valley ends at the contact itself.
 const REACH: f64 = 1.5;
-/// A search stops when its excess over the bound is more than this multiple of the gain of the steps of the last length.
+/// Largest excess over the bound, as a multiple of the last gain.
 const HOPELESS: f64 = 10.0;
-/// The final step of the search for the nearest reading, as a share of the grid's pitch.
+/// Final step, in pitches.
 const FINEST: f64 = 1e-3;
 
-/// The contact elsewhere on the surface with the nearest readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Twin {
     pub position: Position,
-    /// Distance of the readings, in standard deviations of their noise.
     pub distance: f64,
 }
 
-/// Whitened readings over a whole surface, for comparison.
+/// Search for twins.
 ///
-/// For a known force W two contacts differ by |y(a) − y(b)|. For an unknown force the second contact may have any force. The
-/// difference is then the distance of y(a) from the ray through y(b): |y(a)|·sin of the angle between their directions.
+/// Contacts differ by |y(a) − y(b)| for a known force, otherwise by the distance of y(a) from the ray through
+/// y(b).
 pub(super) struct TwinSearch<'a> {
     limit: &'a CramerRaoBound<'a>,
     force_n: f64,
     force: Force,
     grid: Grid,
-    /// Readings at the positions of the grid.
     places: Vec<Place>,
 }
 
-/// Reading at a position of the grid, and its largest difference from the neighbouring readings.
 struct Place {
     shape: Shape,
-    /// The largest difference of the compared part from that of a neighbour.
     spread: f64,
-    /// Derivatives of the compared part along and across, per metre.
+    /// Per metre.
     slopes: [Vec<f64>; 2],
-    /// The largest error of the derivatives' prediction at a neighbour.
+    /// Largest prediction error of the derivatives at a neighbour.
     bend: f64,
 }
 
-/// The part of a reading that is compared: all of it for a known force, its direction for an unknown one.
+/// Compared part of a reading; its direction for an unknown force.
 #[derive(Clone)]
 struct Shape {
     values: Vec<f64>,
-    /// Length of the whitened reading.
     length: f64,
 }
 
@@ -81,7 +73,7 @@ impl<'a> TwinSearch<'a> {
         search
     }
 
-    /// The nearest twin within the bound that is not a neighbour: between the two contacts the readings differ by more.
+    /// Returns the nearest ambiguous contact beyond a region of distinct readings.
     pub fn twin_of(&self, position: Position) -> Option<Twin> {
         let target = self.shape(position);
         let distances: Vec<f64> =
@@ -101,8 +93,6 @@ impl<'a> TwinSearch<'a> {
             .min_by(|a, b| a.distance.total_cmp(&b.distance))
     }
 
-    /// True where a twin may lie between a position of the grid and its neighbours: within the difference to the neighbours, and within
-    /// the prediction of the derivatives and its error at the neighbours.
     fn is_reachable(&self, target: &Shape, i: usize, found: f64) -> bool {
         let place = &self.places[i];
         let scale = if self.force == Force::Known { 1.0 } else { target.length };
@@ -131,8 +121,6 @@ impl<'a> TwinSearch<'a> {
         readings.into_iter().map(shape).collect()
     }
 
-    /// Derivatives of the compared part, along and across. For a direction they are the derivatives of the reading, without their part
-    /// along it, over its length.
     fn slopes(&self, position: Position, shape: &Shape) -> [Vec<f64>; 2] {
         let Columns { along, across, .. } =
             self.limit.derivatives(Contact { position, force_n: self.force_n });
@@ -152,7 +140,8 @@ impl<'a> TwinSearch<'a> {
         match self.force {
             Force::Known => distance(&target.values, other),
             Force::Unknown => {
-                // A force only pushes, so a contact of opposite direction is not nearer than no contact at all.
+                // A force only pushes, so a contact of opposite direction is not nearer than no contact at
+                // all.
                 let along = dot(&target.values, other).max(0.0);
                 let off = sum_in_strands(&target.values, other, |a, b| (a - along * b).powi(2));
                 target.length * off.sqrt()
@@ -160,8 +149,8 @@ impl<'a> TwinSearch<'a> {
         }
     }
 
-    /// The nearest reading around a position of the grid, by ever smaller steps along x and y. These converge in a curved valley too, where
-    /// Gauss–Newton steps would follow it to the contact itself.
+    /// Compass search around a grid position. Gauss–Newton steps would follow a curved valley to the contact
+    /// itself.
     fn descend(&self, target: &Shape, start: Position, distance: f64) -> Twin {
         let mut twin = Twin { position: start, distance };
         let (finest_m, reach_m) = (FINEST * self.grid.pitch_m(), REACH * self.grid.pitch_m());
@@ -203,14 +192,12 @@ impl<'a> TwinSearch<'a> {
     }
 }
 
-/// The step that reduces a difference most, by the slopes; 0 along a direction without effect.
 fn foretold_step([along, across]: &[Vec<f64>; 2], left: &[f64]) -> [f64; 2] {
     let both = dot(along, across);
     let products = [[dot(along, along), both], [both, dot(across, across)]];
     Ldl::semidefinite(&products).solve([dot(along, left), dot(across, left)])
 }
 
-/// Length of the remaining difference after a step.
 fn left_of([along, across]: &[Vec<f64>; 2], [dx_m, dy_m]: [f64; 2], difference: &[f64]) -> f64 {
     let mut left = difference.to_vec();
     for (slope, step_m) in [(along, dx_m), (across, dy_m)] {
@@ -231,7 +218,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     sum_in_strands(a, b, |a, b| a * b)
 }
 
-/// Sum of a term over the sensors, in eight independent partial sums: for many sensors this sum takes most of the search time.
+/// Sum in eight independent strands, for speed.
 fn sum_in_strands(a: &[f64], b: &[f64], term: impl Fn(f64, f64) -> f64) -> f64 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
     let mut strands = [0.0; 8];

@@ -1,4 +1,4 @@
-//! Warnings about a limit as text: the zone, the value and a remedy.
+//! Warnings about a limit.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -13,72 +13,70 @@ use crate::surface::Surface;
 use palpate_numerics::normal_cdf;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// A limit above this share of the length is called blind.
+/// Threshold of a blind limit, as a share of the length.
 const BLIND_SHARE: f64 = 0.1;
-/// A touch with a signal of fewer standard deviations of the noise than this is called faint.
+/// Threshold of a faint signal, in standard deviations.
 const FAINT_SIGNAL: f64 = 5.0;
-/// Readings that differ by fewer standard deviations than this count as equal.
+/// Threshold of equal readings, in standard deviations.
 const INDISTINGUISHABLE: f64 = 0.05;
-/// A touch with a signal of fewer standard deviations than this has no signal at all.
+/// Threshold of no signal, in standard deviations.
 const NO_SIGNAL: f64 = 1e-6;
-/// A reaction that changes by less than this share of the force over the whole length counts as constant.
 const CONSTANT_REACTION: f64 = 1e-6;
 
-/// Warning of contacts that no estimator can locate or distinguish well on this bench.
+/// Warning of contacts that no estimator can locate well.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LimitWarning {
-    /// The limit is a large part of the surface, or there is none.
+    /// A large limit, or none.
     Blind {
-        /// Zone with such limits.
+        /// Zone.
         zone: Zone,
         /// Knowledge of the force.
         force: Force,
         /// Position with the largest limit.
         at: Position,
-        /// The limit there, in metres; `None` where the readings do not determine the position.
+        /// Largest limit; `None` if undetermined.
         sd_m: Option<f64>,
-        /// Largest limit that is not called blind, in metres.
+        /// Threshold.
         bound_m: f64,
-        /// The limit there for a known force, in metres; `None` where the force is known, or where knowing it does not help.
+        /// The limit for a known force, if below the threshold.
         known_force_sd_m: Option<f64>,
-        /// True when reaction sensors at the supports would help; no active sensor measures a reaction.
+        /// True when reaction sensors would help.
         reactions_would_help: bool,
     },
-    /// Two distant contacts with nearly equal readings.
+    /// Two contacts with nearly equal readings.
     Mirror {
-        /// Zone of such contacts.
+        /// Zone.
         zone: Zone,
-        /// Zone of the other contacts.
+        /// Zone of their twins.
         twins: Zone,
         /// Knowledge of the force.
         force: Force,
-        /// The contact with the nearest twin.
+        /// Contact with the nearest twin.
         at: Position,
-        /// Position of the twin.
+        /// The twin.
         twin: Position,
-        /// Distance of the two readings, in standard deviations.
+        /// Their distance, in standard deviations.
         distance: f64,
     },
-    /// A contact with a small signal.
+    /// A small signal.
     Faint {
-        /// Zone of such contacts.
+        /// Zone.
         zone: Zone,
-        /// Position of the faintest contact.
+        /// Contact with the smallest signal.
         at: Position,
-        /// The signal of that contact, in standard deviations of the noise.
+        /// Signal, in standard deviations.
         signal_to_noise: f64,
-        /// The contact force, in newtons.
+        /// Contact force.
         force_n: f64,
-        /// True when reaction sensors at the supports would help; no active sensor measures a reaction.
+        /// True when reaction sensors would help.
         reactions_would_help: bool,
     },
 }
 
-/// All warnings about a limit, for contacts of `force_n` newtons: blind zones, then mirror ambiguity, then faint
-/// contacts, each from left to right.
+/// Returns all warnings: blind, mirror, faint, each from left to right.
 ///
 /// # Errors
-/// [`LimitError::Force`] for a force that is not positive and finite; [`LimitError::Cancelled`].
+/// [`LimitError::Force`] and [`LimitError::Cancelled`].
 pub fn limit_warnings(
     limit: &CramerRaoBound,
     force_n: f64,
@@ -86,7 +84,7 @@ pub fn limit_warnings(
     watch: Watch,
 ) -> Result<Vec<LimitWarning>, LimitError> {
     check_force(force_n)?;
-    // The grid could miss a support between its positions, next to which the readings may determine little.
+    // Supports are added, as the grid could miss the undetermined positions next to them.
     let grid = Grid::over_surface(limit.extent).including(&force_supports(limit));
     let survey = Survey { limit, force_n, force, grid };
     let mut warnings = survey.blind();
@@ -99,7 +97,6 @@ fn force_supports(limit: &CramerRaoBound) -> Vec<Position> {
     limit.model.map_or_else(Vec::new, Surface::force_supports)
 }
 
-/// One survey of the whole surface.
 struct Survey<'a> {
     limit: &'a CramerRaoBound<'a>,
     force_n: f64,
@@ -153,8 +150,7 @@ impl Survey<'_> {
         self.limit.model.is_some_and(has_reactions) && !self.limit.channels.iter().any(reacts)
     }
 
-    /// True where the reaction of a support changes with the position of a contact, or where the force is unknown. The reaction of a
-    /// single clamp is the force itself for any position.
+    /// Reactions help unless they are constant, as that of a single clamp.
     fn reactions_tell(&self, at: Position) -> bool {
         let Some(surface) = self.limit.model else { return false };
         let supports = surface.force_supports();
@@ -165,7 +161,6 @@ impl Survey<'_> {
         self.force == Force::Unknown || supports.is_empty() || supports.iter().any(changes)
     }
 
-    /// Reports each pair of zones once, from either side.
     fn mirrors(&self, watch: Watch) -> Result<Vec<LimitWarning>, Cancelled> {
         let search = TwinSearch::new(self.limit, self.force_n, self.force);
         // Around a faint or blind contact all readings are similar.
@@ -238,14 +233,14 @@ impl LimitWarning {
         }
     }
 
-    /// Zone of the surface for this warning.
+    /// Zone of the warning.
     pub const fn zone(&self) -> Zone {
         match self {
             Self::Blind { zone, .. } | Self::Mirror { zone, .. } | Self::Faint { zone, .. } => *zone,
         }
     }
 
-    /// Worst value and its bound: metres for a blind zone, standard deviations for the others. `None` where no limit exists.
+    /// Worst value and threshold, in metres if blind, otherwise in standard deviations.
     pub const fn value_and_bound(&self) -> (Option<f64>, f64) {
         match self {
             Self::Blind { sd_m, bound_m, .. } => (*sd_m, *bound_m),
@@ -254,7 +249,7 @@ impl LimitWarning {
         }
     }
 
-    /// Advice on a remedy.
+    /// Suggested remedy.
     pub fn help(&self) -> String {
         let (value, bound) = self.value_and_bound();
         match self {
@@ -272,14 +267,14 @@ impl LimitWarning {
                 });
                 ways.join(", or ")
             }
-            // Equal readings stay equal, even with quiet sensors.
+            // Equal readings stay equal without noise.
             Self::Mirror { distance, .. } if *distance < INDISTINGUISHABLE => {
                 "a sensor that breaks the symmetry; less noise does not help".to_owned()
             }
             Self::Mirror { distance, .. } => {
                 format!("{}, or a sensor that distinguishes the two", less_noise(bound / distance))
             }
-            // Over a rigid support the surface does not move, even with quiet sensors and a large force.
+            // Over a rigid support no force deflects the surface.
             Self::Faint { signal_to_noise, reactions_would_help, .. } if *signal_to_noise < NO_SIGNAL => {
                 let sensor = if *reactions_would_help {
                     "reaction sensors at the supports"
@@ -331,7 +326,7 @@ impl fmt::Display for LimitWarning {
                 if *distance < INDISTINGUISHABLE {
                     return write!(f, "{at} and {twin} read the same");
                 }
-                // A reading of one contact is nearer to that of the other when its noise exceeds half their distance.
+                // A reading is nearer to the other contact's when its noise exceeds half their distance.
                 let mistaken = figure(100.0 * normal_cdf(-0.5 * distance));
                 let (distance, bound) = (figure(*distance), figure(AMBIGUOUS_DISTANCE));
                 write!(
@@ -355,7 +350,7 @@ fn place(position: Position) -> String {
     Zone::point(position).to_string()
 }
 
-/// A number with about two significant digits and no exponent: "0.087", "3.3", "8300".
+/// Two significant digits: "0.087", "3.3", "8300".
 fn figure(value: f64) -> String {
     let digits = 1 - value.abs().max(1e-6).log10().floor() as i32;
     let unit = 10f64.powi(-digits);

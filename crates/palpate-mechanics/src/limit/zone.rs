@@ -1,4 +1,4 @@
-//! Positions that cover a surface, and the zones of it where a condition is true.
+//! Grids and zones of a surface.
 
 use serde::Serialize;
 
@@ -7,25 +7,23 @@ use crate::contact::Position;
 use crate::surface::Extent;
 use crate::units::format_length_mm;
 
-/// Halvings in the bisection for the end of a zone between two positions of the grid.
 const HALVINGS: u32 = 12;
 
-/// Smallest share of a plane's zone from which it is called filled.
+/// Smallest share that is not reported.
 const FILLED: f64 = 0.9;
 
-/// An interval of a line, or the bounding rectangle of positions on a plane.
+/// An interval of a line, or a rectangle of a plane.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Zone {
     /// Left or lower left end.
     pub from: Position,
     /// Right or upper right end.
     pub to: Position,
-    /// Share of the zone where the condition is true; 1 for an interval of a line.
+    /// Share with the condition; 1 on a line.
     pub filled: f64,
 }
 
 impl Zone {
-    /// The smallest zone around all `positions`; `None` for no positions.
     pub(super) fn bounding(positions: impl IntoIterator<Item = Position>) -> Option<Self> {
         positions.into_iter().fold(None, |zone: Option<Self>, position| {
             let Self { from, to, .. } = zone.unwrap_or(Self::point(position));
@@ -37,12 +35,11 @@ impl Zone {
         })
     }
 
-    /// One position.
     pub(super) const fn point(position: Position) -> Self {
         Self { from: position, to: position, filled: 1.0 }
     }
 
-    /// True for a position in the zone, its boundary included.
+    /// True for a position in the zone.
     pub fn contains(&self, position: Position) -> bool {
         let Self { from, to, .. } = self;
         (from.x_m..=to.x_m).contains(&position.x_m) && (from.y_m..=to.y_m).contains(&position.y_m)
@@ -50,8 +47,6 @@ impl Zone {
 }
 
 impl std::fmt::Display for Zone {
-    /// "0–1.6 mm", or "0–40 × 10–20 mm" on a plane, "18 % of 0–40 × 10–20 mm" where it is not filled; one position is
-    /// "200 mm".
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { from, to, filled } = self;
         if *filled < FILLED {
@@ -70,14 +65,12 @@ impl std::fmt::Display for Zone {
     }
 }
 
-/// A length rounded to tenths of a millimetre.
 fn tenths_mm(value_m: f64) -> f64 {
     (value_m * 1e4).round() / 1e4
 }
 
-/// The zones of a grid where `holds` is true, each with its positions of the grid. On a line there is one zone for each interval. The
-/// ends of a zone lie between positions of the grid; next to the outermost position it extends to the end of the surface. On a plane there is
-/// one zone for each connected set of neighbours, half a pitch wider than the set.
+/// Zones where `holds` is true, with their grid positions: intervals of a line with bisected ends, or
+/// connected sets of neighbours, extended by half a pitch.
 pub(super) fn zones(
     extent: Extent,
     grid: &Grid,
@@ -106,7 +99,6 @@ pub(super) fn zones(
     found
 }
 
-/// The connected sets of a plane's positions where `flags` are set.
 fn patches(length_m: f64, width_m: f64, grid: &Grid, mut flags: Vec<bool>) -> Vec<(Zone, Vec<Position>)> {
     let rows = grid.positions.len() / grid.columns;
     let (along_m, across_m) = (length_m / (grid.columns + 1) as f64, width_m / (rows + 1) as f64);
@@ -142,7 +134,6 @@ fn patches(length_m: f64, width_m: f64, grid: &Grid, mut flags: Vec<bool>) -> Ve
     found
 }
 
-/// End of the interval where `holds` is true, between a position inside and one outside, in metres.
 fn edge(mut inside_m: f64, mut outside_m: f64, holds: &impl Fn(Position) -> bool) -> f64 {
     for _ in 0..HALVINGS {
         let middle_m = inside_m.midpoint(outside_m);
@@ -151,30 +142,25 @@ fn edge(mut inside_m: f64, mut outside_m: f64, holds: &impl Fn(Position) -> bool
     inside_m
 }
 
-/// Number of positions on a line: 1/400 of the length apart, as everywhere in palpate (every millimetre of the paper's beam).
+/// One per millimetre of the paper's beam.
 const ALONG_A_LINE: usize = 399;
-/// Approximate number of positions on a plane; more of them along its longer side.
 const ON_A_PLANE: f64 = 600.0;
-/// Largest number of positions from a spacing.
 const MOST: usize = 100_000;
 
-/// Positions in rows along x, evenly spaced between the edges of the surface and not on them.
+/// Evenly spaced positions in rows along x, without the edges.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Grid {
     pub positions: Vec<Position>,
-    /// Number of positions in a row.
     pub columns: usize,
 }
 
 impl Grid {
-    /// A grid that resolves the features of a limit.
     pub fn over_surface(extent: Extent) -> Self {
         let Some(width_m) = extent.width_m() else { return Self::even(extent, ALONG_A_LINE, 1) };
         let side = |ratio: f64| (ON_A_PLANE * ratio).sqrt().clamp(5.0, ON_A_PLANE / 5.0).round() as usize;
         Self::even(extent, side(extent.length_m() / width_m), side(width_m / extent.length_m()))
     }
 
-    /// Positions `every_m` apart, from `every_m` to the end of the surface.
     pub fn with_spacing(extent: Extent, every_m: f64) -> Result<Self, LimitError> {
         let inside = |size_m: f64| (size_m / every_m - 1e-6).floor();
         let (columns, rows) = (inside(extent.length_m()), extent.width_m().map_or(1.0, inside));
@@ -186,21 +172,19 @@ impl Grid {
         Ok(Self::new(columns as usize, rows as usize, |column| column as f64 * every_m, y_m))
     }
 
-    /// `columns` × `rows` positions, evenly spaced between the edges.
     fn even(extent: Extent, columns: usize, rows: usize) -> Self {
         let share = |i: usize, count: usize| i as f64 / (count + 1) as f64;
         let y_m = |row: usize| extent.width_m().map_or(0.0, |width_m| share(row, rows) * width_m);
         Self::new(columns, rows, |column| share(column, columns) * extent.length_m(), y_m)
     }
 
-    /// Positions from x of each column and y of each row, which count from 1.
     fn new(columns: usize, rows: usize, x_m: impl Fn(usize) -> f64, y_m: impl Fn(usize) -> f64) -> Self {
         let x_m: Vec<f64> = (1..=columns).map(x_m).collect();
         let row = |y_m: f64| x_m.iter().map(move |&x_m| Position { x_m, y_m });
         Self { positions: (1..=rows).map(y_m).flat_map(row).collect(), columns }
     }
 
-    /// On a line, the grid with these positions added where they lie between its ends; on a plane, the grid unchanged.
+    /// Adds positions between the ends of a line's grid.
     pub fn including(mut self, others: &[Position]) -> Self {
         let rows = self.positions.len() / self.columns.max(1);
         let slack_m = 1e-6 * self.pitch_m();
@@ -218,7 +202,6 @@ impl Grid {
         self
     }
 
-    /// The positions next to position `i`, diagonals included.
     pub fn neighbours(&self, i: usize) -> impl Iterator<Item = usize> + '_ {
         let rows = self.positions.len() / self.columns;
         let (row, column) = (i / self.columns, i % self.columns);
@@ -228,7 +211,6 @@ impl Grid {
             .filter(move |&j| j != i)
     }
 
-    /// Distance between neighbours along x, in metres.
     pub fn pitch_m(&self) -> f64 {
         match self.positions.as_slice() {
             [first, second, ..] if self.columns > 1 => second.x_m - first.x_m,

@@ -23,7 +23,6 @@ fn layout(channels: &[ChannelModel]) -> Layout {
     layout
 }
 
-/// Readings of `channels` for the true values `clean`, every draw from `seed`.
 fn reported(channels: &[ChannelModel], clean: &[f64], seed: u64) -> Vec<f64> {
     let layout = layout(channels);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);

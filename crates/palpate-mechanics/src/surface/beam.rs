@@ -1,4 +1,4 @@
-//! The simply supported beam in closed form, after Euler and Bernoulli.
+//! The simply supported Euler–Bernoulli beam in closed form (deflection: founding paper, eq. 1).
 
 use std::sync::Arc;
 
@@ -9,32 +9,32 @@ use crate::contact::Position;
 use crate::sensing::SensorKind;
 use palpate_numerics::OutOfRange;
 
-/// A straight beam of rectangular section on two simple supports, at x = 0 and x = l.
+/// A rectangular beam on supports at x = 0 and x = l.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Strip", into = "Strip")]
 pub struct Beam(Strip);
 
-/// Error of a beam that cannot be computed.
+/// Error of an invalid beam.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum BeamError {
-    /// A dimension is not a positive, finite number.
+    /// A dimension is not positive and finite.
     #[error(transparent)]
     NotPositive(#[from] OutOfRange),
-    /// The compliance l³/(48·E·I) is not a positive, finite number.
+    /// l³/(48·E·I) is not positive and finite.
     #[error(
         "a beam's compliance at mid-span is {compliance_m_per_n} m/N; it must be greater than 0 and finite"
     )]
     Compliance {
-        /// Mid-span deflection per newton at mid-span, in m/N.
+        /// Compliance at mid-span.
         compliance_m_per_n: f64,
     },
 }
 
 impl Beam {
-    /// A beam of this length, width and thickness, in metres, and Young's modulus, in pascals.
+    /// Creates a beam.
     ///
     /// # Errors
-    /// [`BeamError`] for a number that is not positive and finite, or a compliance that is not.
+    /// [`BeamError`].
     ///
     /// ```
     /// use palpate_mechanics::surface::Beam;
@@ -53,54 +53,46 @@ impl Beam {
         Self::try_from(Strip { length_m, width_m, thickness_m, youngs_modulus_pa })
     }
 
-    /// Length l between the supports, in metres.
+    /// Length l.
     pub fn length_m(&self) -> f64 {
         self.0.length_m
     }
 
-    /// Width of the section, in metres.
+    /// Width.
     pub fn width_m(&self) -> f64 {
         self.0.width_m
     }
 
-    /// Thickness t of the section, in metres.
+    /// Thickness t.
     pub fn thickness_m(&self) -> f64 {
         self.0.thickness_m
     }
 
-    /// Young's modulus E, in pascals.
+    /// Young's modulus E.
     pub fn youngs_modulus_pa(&self) -> f64 {
         self.0.youngs_modulus_pa
     }
 
-    /// Bending stiffness E·I in N·m², with I = width·t³/12.
+    /// E·I in N·m², I = width·t³/12.
     pub fn bending_stiffness(&self) -> f64 {
         self.0.bending_stiffness()
     }
 
-    /// Deflection y(x) per newton at a, in m/N, positive upward: −b·x·(l² − b² − x²)/(6·E·I·l) for x ≤ a, and the mirror image
-    /// for x > a (the founding paper's eq. 1).
     fn deflection(&self, span: Span) -> f64 {
         let Span { l, b, x, .. } = span;
         -b * x * (l * l - b * b - x * x) / (6.0 * self.bending_stiffness() * l)
     }
 
-    /// Slope y'(x) per newton at a, in rad/N: −b·(l² − b² − 3·x²)/(6·E·I·l) for x ≤ a, and the mirror image with opposite sign
-    /// for x > a.
     fn slope(&self, span: Span) -> f64 {
         let Span { l, b, x, direction } = span;
         -direction * b * (l * l - b * b - 3.0 * x * x) / (6.0 * self.bending_stiffness() * l)
     }
 
-    /// Strain on the lower face per newton at a, positive in tension: (t/2)·y''(x) = (t/2)·b·x/(E·I·l) for x ≤ a,
-    /// and the mirror image for x > a. A downward force stretches the lower face, so the strain is never negative.
     fn strain(&self, span: Span) -> f64 {
         let Span { l, b, x, .. } = span;
         0.5 * self.0.thickness_m * b * x / (self.bending_stiffness() * l)
     }
 
-    /// Force of the support at `sensor` on the beam per newton at a, positive upward: b/l on the left, a/l on the
-    /// right; 0 without a support.
     fn reaction(&self, sensor_m: f64, contact_m: f64) -> f64 {
         let l = self.0.length_m;
         let near = |support_m: f64| (sensor_m - support_m).abs() <= 1e-9 * l;
@@ -140,10 +132,8 @@ impl From<Beam> for Strip {
     }
 }
 
-/// Place of the sensor, relative to the support on its side of the force.
-///
-/// l: length; x: distance of the sensor from that support; b: distance of the force from the other one, all in metres;
-/// direction: 1 from the left support, −1 from the right one.
+/// Length l; distance x of the sensor from the support on its side of the force; distance b of the force from
+/// the other support; direction 1 from the left, −1 from the right.
 #[derive(Clone, Copy)]
 struct Span {
     l: f64,
@@ -162,7 +152,6 @@ impl Span {
     }
 }
 
-/// The influence function of one sensor on a [`Beam`].
 #[derive(Clone, Copy, Debug)]
 struct BeamInfluence<'a> {
     beam: &'a Beam,
@@ -183,9 +172,7 @@ impl InfluenceFunction for BeamInfluence<'_> {
         }
     }
 
-    /// Closed forms. Deflection: the slope with sensor and force exchanged (Maxwell's reciprocity,
-    /// y(x; a) = y(a; x)). Slope: (l² − 3·b² − 3·x²)/(6·E·I·l) on either side. Strain: −(t/2)·x/(E·I·l)
-    /// and the mirror image with opposite sign, with the kink over the sensor. Reactions: −1/l and 1/l.
+    /// Deflection: slope with sensor and force exchanged (Maxwell's reciprocity).
     fn gradient(&self, contact: Position) -> [f64; 2] {
         let Self { beam, kind, sensor_m } = *self;
         let (l, stiffness) = (beam.0.length_m, beam.bending_stiffness());
@@ -194,7 +181,7 @@ impl InfluenceFunction for BeamInfluence<'_> {
             SensorKind::Deflection => beam.slope(Span::new(l, contact.x_m, sensor_m)),
             SensorKind::Slope => (l * l - 3.0 * b * b - 3.0 * x * x) / (6.0 * stiffness * l),
             SensorKind::Strain => -direction * 0.5 * beam.0.thickness_m * x / (stiffness * l),
-            // A reaction is linear in the contact's position.
+            // A reaction is linear in the contact position.
             SensorKind::Reaction => (beam.reaction(sensor_m, l) - beam.reaction(sensor_m, 0.0)) / l,
             SensorKind::Raw => 0.0,
         };
@@ -220,15 +207,13 @@ impl Surface for Beam {
         [0.0, self.0.length_m].map(Position::along).to_vec()
     }
 
-    /// At the supports deflection and bending moment are 0.
     fn insensitive_sensor(&self, kind: SensorKind, sensor: Position) -> Option<InsensitiveSensor> {
         let held =
             matches!(kind, SensorKind::Deflection | SensorKind::Strain) && self.is_supported_at(sensor);
         held.then_some(InsensitiveSensor::Held { kind })
     }
 
-    /// Deflection l³/(48·E·I) at mid-span; slope l²/(9·√3·E·I) over a support, for a force l/√3 from the other one;
-    /// strain t·l/(8·E·I) at mid-span; reaction 1 under the force.
+    /// Deflection and strain at mid-span; slope over a support, for a force at l/√3 from the other.
     fn full_scale(&self, kind: SensorKind) -> f64 {
         let (l, stiffness) = (self.0.length_m, self.bending_stiffness());
         match kind {

@@ -1,52 +1,51 @@
-//! Readings of many sensors, contact by contact.
+//! Readings of many sensors by contact.
 
 use std::ops::ControlFlow;
 
 use crate::contact::Position;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// Readings of all sensors per newton at a contact, in their order, and their derivatives along and across, per metre.
+/// Readings of all sensors per newton, and their derivatives by x and y.
 pub type Influences = [Vec<f64>; 3];
 
-/// Method of solving a surface for the readings of many sensors under many contacts.
+/// Method of solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Solving {
-    /// One solution for each sensor, its influence function.
+    /// One solution per sensor.
     BySensor,
-    /// By reciprocity, three for each contact.
+    /// Three reciprocal solutions per contact.
     ByContact,
 }
 
-/// Estimated work and memory of solving a surface.
+/// Estimated cost of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolutionCost {
-    /// Memory of the equations and of the data of the sensors, in bytes.
+    /// Memory.
     pub memory_bytes: f64,
-    /// Time to set up and factor the equations once, in seconds of a core of some 3 GHz.
+    /// Time of the factorisation on a 3 GHz core.
     pub seconds_once: f64,
-    /// Time of one of many solutions.
+    /// Time per solution.
     pub seconds_each: f64,
 }
 
 impl Solving {
-    /// The method with fewer solutions.
+    /// Returns the method with fewer solutions.
     pub const fn sooner(sensors: usize, contacts: usize) -> Self {
         if sensors > ContactLoad::EACH * contacts { Self::ByContact } else { Self::BySensor }
     }
 }
 
-/// Readings of many sensors, by contact, on a surface with deflections proportional to the force. By reciprocity one solution for a
-/// contact gives the readings of all sensors, whereas influence functions take one solution for each sensor.
+/// Readings of many sensors by contact, by reciprocity.
 pub trait ReadingsByContact: Send + Sync {
-    /// Readings of the sensors, in their order, under each of `loads`.
+    /// Returns the readings of all sensors under each load.
     fn under(&self, loads: &[ContactLoad]) -> Vec<Vec<f64>>;
 
-    /// A unit force at a contact as a sum of loads on degrees of freedom, each with its factor. Contacts near each other share these loads.
+    /// Returns a unit force at a contact as loads on degrees of freedom, with factors.
     fn degrees(&self, contact: Position) -> Vec<(usize, f64)>;
 
-    /// Number of loads that are solved together faster than one by one; more loads cost memory and save no time.
+    /// Number of loads that are fastest together.
     fn together(&self) -> usize;
-    /// Influences at each of `contacts`.
+    /// Returns the influences at each contact.
     fn influences(&self, contacts: &[Position]) -> Vec<Influences> {
         let loads: Vec<ContactLoad> = contacts.iter().copied().flat_map(ContactLoad::all).collect();
         let mut under = self.under(&loads).into_iter();
@@ -55,11 +54,10 @@ pub trait ReadingsByContact: Send + Sync {
 }
 
 impl dyn ReadingsByContact + '_ {
-    /// Solves for contacts, a few at a time, and passes each index with its influences to `take`, until `take` stops. `stage` is
-    /// the name of the stage for the watch.
+    /// Passes each index and its influences to `take`, until it breaks.
     ///
     /// # Errors
-    /// [`Cancelled`] when the work is to stop.
+    /// [`Cancelled`].
     pub fn for_each_contact(
         &self,
         contacts: &[Position],
@@ -80,24 +78,24 @@ impl dyn ReadingsByContact + '_ {
     }
 }
 
-/// A unit load on a surface at a contact.
+/// A unit load at a contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ContactLoad {
-    /// A downward unit force: sensors read their influence.
+    /// A downward unit force.
     Force(Position),
-    /// Derivative with respect to x: sensors read the derivative of their influence along the length, per metre.
+    /// Derivative of the force by x.
     ByX(Position),
-    /// Derivative with respect to y, across the width.
+    /// Derivative of the force by y.
     ByY(Position),
-    /// A unit load on a degree of freedom of [`ReadingsByContact::degrees`].
+    /// A unit load on a degree of freedom.
     Degree(usize),
 }
 
 impl ContactLoad {
-    /// Number of loads that determine the influences at one contact.
+    /// Loads per contact.
     pub const EACH: usize = 3;
 
-    /// The force at a contact and its derivatives.
+    /// Returns the loads at a contact.
     pub const fn all(contact: Position) -> [Self; Self::EACH] {
         [Self::Force(contact), Self::ByX(contact), Self::ByY(contact)]
     }

@@ -1,4 +1,4 @@
-//! The flexible digit: a thin cantilever finger with strain gauges, after Ma and his colleagues.
+//! The flexible digit, a cantilever finger with strain gauges, after Ma et al.
 
 use std::sync::Arc;
 
@@ -11,16 +11,14 @@ use crate::contact::{Contact, Position};
 use crate::sensing::SensorKind;
 use palpate_numerics::OutOfRange;
 
-/// A straight finger of rectangular section, clamped at x = 0 and free at x = l, that can bend far.
+/// A rectangular finger, clamped at x = 0.
 ///
-/// The sensors are strain gauges. For small forces their readings are proportional to the force: the influence functions of [`Surface`].
-/// For any force they are those of the finger's [`Elastica`]. Positions are counted along the finger, so a contact keeps its position when
-/// the finger bends.
+/// Influence functions are for small forces, response functions those of the [`Elastica`]. Positions are
+/// along the bent finger.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Finger", into = "Finger")]
 pub struct Digit(Finger);
 
-/// An unchecked digit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Finger {
     #[serde(flatten)]
@@ -28,29 +26,28 @@ struct Finger {
     direction: ForceDirection,
 }
 
-/// Error of a digit that cannot be computed.
+/// Error of an invalid digit.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum DigitError {
-    /// A dimension is not a positive, finite number.
+    /// A dimension is not positive and finite.
     #[error(transparent)]
     NotPositive(#[from] OutOfRange),
-    /// The force that causes large bending, E·I/l², is not a positive, finite number.
+    /// E·I/l² is not positive and finite.
     #[error("a digit's characteristic force E·I/l² is {force_n} N; it must be greater than 0 and finite")]
     Stiffness {
-        /// E·I/l², in newtons.
+        /// The value.
         force_n: f64,
     },
 }
 
 impl Digit {
-    /// The largest load F·s²/(E·I) of a contact in palpate's searches: the end of the founding tables of the bent cantilever.
-    /// A vertical load of 10 turns the contact by 82°, a normal one by 157°.
+    /// Largest load F·s²/(E·I) in searches, as in the tables of Bisshopp and Drucker.
     pub const MOST_LOAD: f64 = 10.0;
 
-    /// A finger of this length, width and thickness, in metres, and Young's modulus, in pascals, with normal forces.
+    /// Creates a digit with normal forces.
     ///
     /// # Errors
-    /// [`DigitError`] for a number that is not positive and finite.
+    /// [`DigitError`].
     ///
     /// ```
     /// use palpate_mechanics::surface::Digit;
@@ -70,53 +67,53 @@ impl Digit {
         Self::try_from(Finger { strip, direction: ForceDirection::Normal })
     }
 
-    /// This digit with contact forces of this direction.
+    /// Sets the direction of forces.
     #[must_use]
     pub fn with_direction(self, direction: ForceDirection) -> Self {
         Self(Finger { direction, ..self.0 })
     }
 
-    /// Direction of the contact's force.
+    /// Direction of forces.
     pub fn direction(&self) -> ForceDirection {
         self.0.direction
     }
 
-    /// Length l from the clamp to the tip, in metres.
+    /// Length l.
     pub fn length_m(&self) -> f64 {
         self.0.strip.length_m
     }
 
-    /// Width of the section, in metres.
+    /// Width.
     pub fn width_m(&self) -> f64 {
         self.0.strip.width_m
     }
 
-    /// Thickness t of the section, in metres.
+    /// Thickness t.
     pub fn thickness_m(&self) -> f64 {
         self.0.strip.thickness_m
     }
 
-    /// Young's modulus E, in pascals.
+    /// Young's modulus E.
     pub fn youngs_modulus_pa(&self) -> f64 {
         self.0.strip.youngs_modulus_pa
     }
 
-    /// Bending stiffness E·I in N·m², with I = width·t³/12.
+    /// E·I in N·m², I = width·t³/12.
     pub fn bending_stiffness(&self) -> f64 {
         self.0.strip.bending_stiffness()
     }
 
-    /// The force F at the tip for a load F·l²/(E·I) of 1, in newtons: up to a tenth of it the finger is linear within 1 %.
+    /// E·I/l²; up to a tenth of it the finger is linear within 1 %.
     pub fn characteristic_force_n(&self) -> f64 {
         self.bending_stiffness() / (self.length_m() * self.length_m())
     }
 
-    /// The finger's exact shape under `contact`.
+    /// Returns the shape under `contact`.
     pub fn shape(&self, contact: Contact) -> Elastica {
         Elastica::new(self.direction(), self.bending_stiffness(), contact.position.x_m, contact.force_n)
     }
 
-    /// Strain on the lower face per downward curvature, in metres: −t/2. A downward force stretches the upper face.
+    /// −t/2, for the lower face.
     pub fn strain_per_curvature_m(&self) -> f64 {
         -0.5 * self.thickness_m()
     }
@@ -148,16 +145,15 @@ impl From<Digit> for Finger {
     }
 }
 
-/// One gauge on a [`Digit`]; 0 for any other kind of sensor, which rigs refuse.
+/// A gauge; 0 for another kind.
 #[derive(Clone, Copy, Debug)]
 struct Gauge<'a> {
     digit: &'a Digit,
-    /// −t/2, or 0 for another kind.
     strain_per_curvature_m: f64,
     at_m: f64,
 }
 
-/// Small forces: the curvature per newton at a is (a − x)/(E·I) before the contact, and 0 beyond.
+/// Small forces.
 impl InfluenceFunction for Gauge<'_> {
     fn at(&self, contact: Position) -> f64 {
         let lever_m = (contact.x_m - self.at_m).max(0.0);
@@ -170,7 +166,6 @@ impl InfluenceFunction for Gauge<'_> {
     }
 }
 
-/// Any force.
 impl ResponseFunction for Gauge<'_> {
     fn at(&self, contact: Contact) -> f64 {
         self.strain_per_curvature_m * self.digit.shape(contact).curvature(self.at_m)
@@ -204,7 +199,7 @@ impl Surface for Digit {
         false
     }
 
-    /// Strain t·l/(2·E·I), at the clamp for a force at the tip.
+    /// Strain at the clamp for a force at the tip.
     fn full_scale(&self, kind: SensorKind) -> f64 {
         match kind {
             SensorKind::Strain => 0.5 * self.thickness_m() * self.length_m() / self.bending_stiffness(),

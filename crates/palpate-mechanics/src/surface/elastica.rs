@@ -1,24 +1,21 @@
-//! The exact shape of a thin finger under one force: Euler's elastica.
+//! Euler's elastica: a thin finger under one force.
 //!
-//! The finger is clamped at σ = 0, does not stretch, and is straight beyond the contact at σ = s. Let ψ be the downward rotation of
-//! the finger. Before the contact
+//! The finger is clamped at σ = 0 and straight beyond the contact at σ = s. The downward rotation ψ before
+//! the contact:
 //!
 //! ψ″(σ) = −q·cos(ψ − α), ψ(0) = 0, ψ′(s) = 0, q = F/(E·I),
 //!
-//! where α is the angle of the force from the downward normal of the clamp: 0 for a force that stays vertical, ψ(s) for
-//! one that stays normal to the finger. From the contact on this is a pendulum of angle ω = π/2 + ψ − α that starts
-//! at rest: with u = √q·(s − σ)
+//! with the angle α of the force from the clamp's normal: 0 for a vertical force, ψ(s) for a normal one. With
+//! ω = π/2 + ψ − α and u = √q·(s − σ):
 //!
 //! sin(ω/2) = √m·cd(u | m), ψ′ = 2·√q·√(m·m′)·sd(u | m), m = sin²(ω(s)/2), m′ = 1 − m
 //!
-//! (Love, *A Treatise on the Mathematical Theory of Elasticity*, §§ 262–263; Jacobi's functions). For a normal force the
-//! pendulum starts at ω = π/2, so that m = ½ for any load. For a vertical one it reaches ω = π/2 at the clamp. With the
-//! Gudermannian w of the rotation there, sin ψ(s) = tanh w and m = 1/(1 + e⁻²ʷ), the load is
+//! (Love, *A Treatise on the Mathematical Theory of Elasticity*, §§ 262–263). For a normal force m = ½; for a
+//! vertical one sin ψ(s) = tanh w, m = 1/(1 + e⁻²ʷ), and
 //!
 //! F·s²/(E·I) = (1 − e⁻²ʷ)·R_F(e⁻²ʷ, 2/(1 + e²ʷ), 1)²
 //!
-//! in Carlson's form of Bisshopp and Drucker's equation (*Large deflection of cantilever beams*, 1945), a convex function
-//! of w that Newton's method inverts.
+//! (Bisshopp and Drucker, *Large deflection of cantilever beams*, 1945, in Carlson's form).
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -26,13 +23,13 @@ use serde::{Deserialize, Serialize};
 
 use palpate_numerics::{Jacobi, carlson_rd, carlson_rf};
 
-/// Direction of a contact's force on a finger.
+/// Direction of a contact force on a finger.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ForceDirection {
-    /// Always normal to the finger at the contact: a contact without friction.
+    /// Normal to the bent finger.
     Normal,
-    /// Always normal to the straight finger: a weight on a horizontal finger.
+    /// Normal to the straight finger.
     Vertical,
 }
 
@@ -46,12 +43,12 @@ impl ForceDirection {
     }
 }
 
-/// Largest w: a vertical load there passes 10⁵, and the finger at the contact hangs straight down to all digits.
+/// Largest w, at loads above 10⁵.
 const MOST_TURN: f64 = 300.0;
-/// Largest number of Newton steps; from above the root of a convex function about six reach the last bit.
+/// Bound of the Newton steps; about six are necessary.
 const MOST_STEPS: usize = 60;
 
-/// The exact shape of a finger under one force.
+/// Shape of a finger under one force.
 ///
 /// ```
 /// use palpate_mechanics::surface::{Elastica, ForceDirection};
@@ -63,30 +60,24 @@ const MOST_STEPS: usize = 60;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Elastica {
     direction: ForceDirection,
-    /// s, in metres.
+    /// s.
     contact_m: f64,
-    /// E·I, in N·m².
+    /// E·I.
     stiffness_n_m2: f64,
-    /// 1, or −1 for a force that pulls upward.
     sign: f64,
-    /// q, in 1/m².
     q: f64,
-    /// m′ = 1 − m.
     complement: f64,
-    /// √(m·m′), half of the cosine of the force against the finger's normal at the contact.
     half_cosine: f64,
     /// dm/d(q·s²).
     modulus_by_load: f64,
-    /// α, in radians.
+    /// α.
     force_angle: f64,
 }
 
 impl Elastica {
-    /// The shape of a finger of bending stiffness E·I (N·m², greater than 0) under a force (N, positive downward) at
-    /// `contact_m` metres along it, which is at least 0.
+    /// Creates the shape for E·I > 0 and a force at `contact_m` ≥ 0.
     ///
-    /// Valid for vertical loads F·s²/(E·I) up to 10⁵. A normal load above 13.75 = (2·K(½))² turns the contact by more
-    /// than half a turn, and a frictionless finger would then touch itself.
+    /// Valid for vertical loads F·s²/(E·I) ≤ 10⁵, and normal loads ≤ (2·K(½))² = 13.75 (half a turn).
     pub fn new(direction: ForceDirection, stiffness_n_m2: f64, contact_m: f64, force_n: f64) -> Self {
         let q = force_n.abs() / stiffness_n_m2;
         let mut shape = Self {
@@ -113,12 +104,12 @@ impl Elastica {
         shape
     }
 
-    /// Rotation of the finger, positive downward, at σ = `at_m` metres from the clamp, in radians.
+    /// Downward rotation at `at_m`, in radians.
     pub fn angle(&self, at_m: f64) -> f64 {
         self.sign * (self.pendulum_angle(at_m) - FRAC_PI_2 + self.force_angle)
     }
 
-    /// The curvature ψ′ at `at_m`, positive where the finger bends downward, in 1/m; 0 beyond the contact.
+    /// Downward curvature ψ′, in 1/m; 0 beyond the contact.
     pub fn curvature(&self, at_m: f64) -> f64 {
         if at_m >= self.contact_m {
             return 0.0;
@@ -127,8 +118,7 @@ impl Elastica {
         self.sign * 2.0 * self.q.sqrt() * self.half_cosine * sn / dn
     }
 
-    /// Derivatives of the curvature at `at_m` with respect to the contact's position along the finger, in 1/m², and the force, in
-    /// 1/(m·N). They are 0 beyond the contact; at the contact they are the limits from before it.
+    /// Derivatives of the curvature by contact position and force; 0 beyond the contact.
     pub fn curvature_gradient(&self, at_m: f64) -> [f64; 2] {
         if at_m > self.contact_m {
             return [0.0; 2];
@@ -151,8 +141,7 @@ impl Elastica {
         [self.sign * (by_distance + by_load * 2.0 * q * s), (by_q + by_load * s * s) / self.stiffness_n_m2]
     }
 
-    /// Position of the point σ = `at_m` of the bent finger: along the straight finger, and across it (positive upward), in metres from
-    /// the clamp.
+    /// Position along the straight finger and upward, in metres.
     pub fn point(&self, at_m: f64) -> [f64; 2] {
         let bent_m = at_m.min(self.contact_m);
         let ([x0, y0], [x1, y1]) = (self.way_to_contact(0.0), self.way_to_contact(bent_m));
@@ -161,8 +150,8 @@ impl Elastica {
         [x0 - x1 + straight_m * cosine, -self.sign * (y0 - y1) - straight_m * sine]
     }
 
-    /// The vector from σ to the contact, along the straight finger and downward. With the integrals S = ∫ sin ω = ψ′/q and
-    /// C = ∫ cos ω = (2·(ℰ − m·sn·cd) − u)/√q from σ to the contact it is (S·cos α + C·sin α, S·sin α − C·cos α).
+    /// (S·cos α + C·sin α, S·sin α − C·cos α), with S = ∫ sin ω = ψ′/q and C = ∫ cos ω =
+    /// (2·(ℰ − m·sn·cd) − u)/√q.
     fn way_to_contact(&self, at_m: f64) -> [f64; 2] {
         if self.q == 0.0 {
             return [self.contact_m - at_m, 0.0];
@@ -176,7 +165,6 @@ impl Elastica {
         [sines * cos_a + cosines * sin_a, sines * sin_a - cosines * cos_a]
     }
 
-    /// ω at σ = `at_m`, and at the contact for any point beyond it.
     fn pendulum_angle(&self, at_m: f64) -> f64 {
         let Jacobi { cn, .. } = self.jacobi(at_m.min(self.contact_m));
         let m = 1.0 - self.complement;
@@ -188,18 +176,14 @@ impl Elastica {
     }
 }
 
-/// Rotation of the finger at the contact of a vertical force.
 #[derive(Clone, Copy)]
 struct Turn {
-    /// The Gudermannian argument: sin ψ(s) = tanh w.
     w: f64,
-    /// dw/d(F·s²/(E·I)).
     by_load: f64,
 }
 
 impl Turn {
-    /// Inverts the load by Newton's method. The load is convex in w, at least 2·w and at least (w − 1)². So the first guess
-    /// lies above the root, and so do all further iterates.
+    /// Newton's method. The load is convex in w, ≥ 2·w and ≥ (w − 1)², so all iterates are above the root.
     fn of_load(load: f64) -> Self {
         let mut turn = Self { w: (0.5 * load).min(load.sqrt() + 1.0).min(MOST_TURN), by_load: 0.5 };
         for _ in 0..MOST_STEPS {
@@ -219,10 +203,10 @@ impl Turn {
     }
 }
 
-/// The load F·s²/(E·I) that turns the contact by w > 0, and its derivative.
+/// The load F·s²/(E·I) at w > 0, and its derivative.
 ///
-/// The root of the load is F(φ, m) with cos φ = e⁻ʷ; dF = dφ/Δ + (E − m′·F − m·sin φ·cos φ/Δ)·dw, as dm = 2·m·m′·dw, and
-/// Δ² = 1 − m·sin² φ = 1 − tanh w.
+/// √load = F(φ, m) with cos φ = e⁻ʷ; dF = dφ/Δ + (E − m′·F − m·sin φ·cos φ/Δ)·dw, Δ² = 1 − m·sin² φ =
+/// 1 − tanh w.
 fn load_of_turn(w: f64) -> (f64, f64) {
     let squared_cosine = (-2.0 * w).exp();
     let squared_sine = -(-2.0 * w).exp_m1();

@@ -1,15 +1,13 @@
-//! A distributed force on part of a surface.
+//! Distributed forces.
 
 use super::InfluenceFunction;
 use crate::contact::Position;
 
-/// Points along each side in the sum over a distributed force. By the midpoint rule the kinks of strain and reaction sensors
-/// cost less than 10⁻⁴ of their full scale.
+/// Quadrature points; the midpoint rule errs by less than 10⁻⁴ of full scale at kinks.
 const POINTS_ALONG: usize = 100;
-/// Points across the width in that sum, on a plane.
 const POINTS_ACROSS: usize = 20;
 
-/// A uniformly distributed force on an interval of a line, or on a rectangle of a plane.
+/// A uniform force on an interval or a rectangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UniformLoad {
     from: Position,
@@ -18,7 +16,7 @@ pub struct UniformLoad {
 }
 
 impl UniformLoad {
-    /// A force in newtons on an interval of a line, between two ends in metres.
+    /// Creates a load between two ends.
     ///
     /// ```
     /// use palpate_mechanics::surface::UniformLoad;
@@ -30,7 +28,7 @@ impl UniformLoad {
         Self::new(Position::along(from_m), Position::along(to_m), force_n)
     }
 
-    /// A force in newtons on the interval or rectangle between two opposite ends or corners.
+    /// Creates a load between two opposite corners.
     pub const fn new(one: Position, other: Position, force_n: f64) -> Self {
         Self {
             from: Position { x_m: one.x_m.min(other.x_m), y_m: one.y_m.min(other.y_m) },
@@ -49,23 +47,23 @@ impl UniformLoad {
         self.to
     }
 
-    /// The total force in newtons, positive downward.
+    /// Total force, positive downward.
     pub const fn force_n(&self) -> f64 {
         self.force_n
     }
 
-    /// The centre of the load, where its resultant acts.
+    /// Centre of the load.
     pub fn centre(&self) -> Position {
         Position { x_m: self.from.x_m.midpoint(self.to.x_m), y_m: self.from.y_m.midpoint(self.to.y_m) }
     }
 
-    /// Reading of a sensor per newton of the load: the mean of the influence function over the load, in its unit.
+    /// Mean of an influence function over the load.
     pub fn mean(&self, influence: &dyn InfluenceFunction) -> f64 {
         let points = self.points();
         points.iter().map(|point| influence.at(*point)).sum::<f64>() / points.len() as f64
     }
 
-    /// Derivatives of that reading with respect to a motion of the whole load along x and along y, per metre.
+    /// Derivatives of [`UniformLoad::mean`] by a translation.
     pub fn mean_gradient(&self, influence: &dyn InfluenceFunction) -> [f64; 2] {
         let points = self.points();
         let sum = points.iter().fold([0.0, 0.0], |[sum_x, sum_y], point| {
@@ -81,7 +79,7 @@ impl UniformLoad {
     }
 }
 
-/// The middles of `counts` equal parts along x and along y of the rectangle between two corners, row by row.
+/// Returns the centres of `counts` equal parts of a rectangle, row by row.
 pub fn midpoints(from: Position, to: Position, counts: [usize; 2]) -> Vec<Position> {
     let at =
         |low: f64, high: f64, i: usize, count: usize| low + (high - low) * (i as f64 + 0.5) / count as f64;
@@ -100,7 +98,7 @@ mod tests {
         Beam::new(0.4, 0.04, 1.2e-3, 200e9).unwrap()
     }
 
-    /// 5·q·l⁴/(384·E·I) at mid-span, t·q·l²/(16·E·I) there, and half of the load at each support.
+    /// Tables: 5·q·l⁴/(384·E·I), t·q·l²/(16·E·I), half.
     #[test]
     fn a_load_all_over_a_beam_bends_it_as_tables_say() {
         let (beam, l) = (beam(), 0.4);

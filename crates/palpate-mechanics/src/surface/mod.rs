@@ -1,4 +1,4 @@
-//! Surfaces and their influence functions: the reading of a sensor under a unit force at a position. Recordings and estimators are elsewhere.
+//! Elastic surfaces and their influence functions.
 
 mod beam;
 mod by_contact;
@@ -32,15 +32,14 @@ use crate::sensing::SensorKind;
 use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// An elastic surface with a model of its mechanics.
+/// A surface with a mechanical model.
 ///
-/// Forces are positive downward, deflections upward, so deflections are negative as in the founding paper's eq. (1).
+/// Forces are positive downward, deflections upward (founding paper, eq. 1).
 pub trait Surface: Send + Sync {
-    /// The influence function of a sensor of this `kind` at `sensor`, which must be on the surface. On a surface of finite elements
-    /// each call takes one solution, so keep the result.
+    /// Returns an influence function; on finite elements by one solution.
     fn influence_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn InfluenceFunction + '_>;
 
-    /// The influence functions of several sensors of one kind; some surfaces compute them faster together than one by one.
+    /// Returns several influence functions.
     fn influence_functions(
         &self,
         kind: SensorKind,
@@ -49,10 +48,10 @@ pub trait Surface: Send + Sync {
         sensors.iter().map(|sensor| self.influence_function(kind, *sensor)).collect()
     }
 
-    /// The influence functions of several sensors of one kind, watched during the solution.
+    /// Returns [`Surface::influence_functions`], watched.
     ///
     /// # Errors
-    /// [`Cancelled`] when the watch stopped it.
+    /// [`Cancelled`].
     fn influence_functions_watched(
         &self,
         kind: SensorKind,
@@ -63,12 +62,12 @@ pub trait Surface: Send + Sync {
         Ok(self.influence_functions(kind, sensors))
     }
 
-    /// The response function of a sensor: influence times force, unless the surface bends too far for that.
+    /// Returns a response function.
     fn response_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn ResponseFunction + '_> {
         Arc::new(Proportional(self.influence_function(kind, sensor)))
     }
 
-    /// The response functions of several sensors of one kind, in the way of [`Surface::influence_functions`].
+    /// Returns several response functions.
     fn response_functions(
         &self,
         kind: SensorKind,
@@ -77,10 +76,10 @@ pub trait Surface: Send + Sync {
         sensors.iter().map(|sensor| self.response_function(kind, *sensor)).collect()
     }
 
-    /// The response functions of several sensors of one kind, watched during the solution.
+    /// Returns [`Surface::response_functions`], watched.
     ///
     /// # Errors
-    /// [`Cancelled`] when the watch stopped it.
+    /// [`Cancelled`].
     fn response_functions_watched(
         &self,
         kind: SensorKind,
@@ -91,8 +90,7 @@ pub trait Surface: Send + Sync {
         Ok(self.response_functions(kind, sensors))
     }
 
-    /// Readings of many sensors, contact by contact; `None` where a surface has no faster way than influence
-    /// functions.
+    /// Returns readings by contact, if that is faster for many sensors.
     fn readings_by_contact(
         &self,
         _sensors: &[(SensorKind, Position)],
@@ -100,94 +98,90 @@ pub trait Surface: Send + Sync {
         None
     }
 
-    /// Estimated work and memory of solving the surface for this number of sensors, without a solution. `None` for closed forms, which take
-    /// almost no work and are not solved by contact.
+    /// Estimates the cost of solutions; `None` for closed forms.
     fn solution_cost(&self, _sensors: usize, _solving: Solving) -> Option<SolutionCost> {
         None
     }
 
-    /// One value of an influence function, for a single use of the sensor.
+    /// Returns one value of an influence function.
     fn influence(&self, kind: SensorKind, sensor: Position, contact: Position) -> f64 {
         self.influence_function(kind, sensor).at(contact)
     }
 
-    /// True when a support at `position` has a reaction force, which can be measured.
+    /// True for a support with a reaction force.
     fn is_supported_at(&self, position: Position) -> bool;
 
-    /// Positions of single supports with a measurable reaction force, from left to right.
+    /// Supports with a reaction force, from left to right.
     fn force_supports(&self) -> Vec<Position> {
         Vec::new()
     }
 
-    /// Reason for which a sensor of this `kind` at `sensor` reads 0 for every contact; `None` for a sensitive sensor.
+    /// Reason for which a sensor reads 0 for every contact.
     fn insensitive_sensor(&self, _kind: SensorKind, _sensor: Position) -> Option<InsensitiveSensor> {
         None
     }
 
-    /// Solves the surface, where necessary, and checks that it is in balance under forces all over it. Before this check, and
-    /// where no solution exists, the surface's functions may be NaN.
+    /// Solves the surface and checks its balance; otherwise functions may be NaN.
     ///
     /// # Errors
-    /// [`Unsolvable`], with the singular equations or the imbalance.
+    /// [`Unsolvable`].
     fn check_solution(&self) -> Result<(), Unsolvable> {
         self.check_solution_watched(Watch::NONE)
     }
 
-    /// Checks the solution as [`Surface::check_solution`] does, watched; a stop leaves the surface unchanged.
+    /// Checks as [`Surface::check_solution`], watched.
     ///
     /// # Errors
-    /// As [`Surface::check_solution`], and [`Unsolvable::Cancelled`].
+    /// [`Unsolvable`]; cancelled work leaves the surface unchanged.
     fn check_solution_watched(&self, watch: Watch) -> Result<(), Unsolvable> {
         Ok(watch.round()?)
     }
 
-    /// The largest magnitude of `influence` for this `kind`, over all sensor and contact positions.
+    /// Largest magnitude of `influence`.
     fn full_scale(&self, kind: SensorKind) -> f64;
 
-    /// The extent of the surface.
+    /// Extent of the surface.
     fn extent(&self) -> Extent;
 
-    /// Length l of the surface along x, in metres.
+    /// Length l along x.
     fn length_m(&self) -> f64 {
         self.extent().length_m()
     }
 
-    /// True for a `position` on the surface, its boundary included.
+    /// True for a position on the surface.
     fn contains(&self, position: Position) -> bool {
         self.extent().contains(position)
     }
 }
 
-/// Influence function of one sensor: its reading per newton of downward force, as a function of the contact's position.
+/// Influence function of a sensor.
 pub trait InfluenceFunction: Send + Sync {
-    /// The reading per newton of downward force at `contact`, in SI units per newton (m/N, rad/N, 1/N, N/N); 0 for a raw
-    /// channel, which has no model. Off the surface the value has no meaning.
+    /// Reading per newton of downward force, in SI units; 0 for a raw channel.
     fn at(&self, contact: Position) -> f64;
 
-    /// Derivatives with respect to the contact's position along x and along y, in the reading's unit per newton and metre; 0 along y on a
-    /// one-dimensional surface. At a kink, a value between those of the two sides.
+    /// Derivatives by x and y; at a kink, between both sides.
     fn gradient(&self, contact: Position) -> [f64; 2];
 }
 
-/// Response function of one sensor: its reading as a function of the contact's position and force.
+/// Response function of a sensor.
 pub trait ResponseFunction: Send + Sync {
-    /// The reading at `contact`, in the sensor's SI unit; 0 for a raw channel. Off the surface the value has no meaning.
+    /// Reading, in SI units; 0 for a raw channel.
     fn at(&self, contact: Contact) -> f64;
 
-    /// Derivatives of the reading with respect to the contact. At a kink, a value between those of the two sides.
+    /// Derivatives; at a kink, between both sides.
     fn gradient(&self, contact: Contact) -> ResponseGradient;
 }
 
-/// The derivatives of a reading with respect to its contact.
+/// Derivatives of a reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ResponseGradient {
-    /// With respect to the contact's position along x and along y, in the reading's unit per metre.
+    /// By x and y.
     pub position: [f64; 2],
-    /// With respect to the contact's force, in the reading's unit per newton.
+    /// By the force.
     pub force: f64,
 }
 
-/// Readings that are proportional to the force: force × influence.
+/// Response proportional to the force.
 #[derive(Clone)]
 pub struct Proportional<'a>(pub Arc<dyn InfluenceFunction + 'a>);
 
@@ -202,34 +196,33 @@ impl ResponseFunction for Proportional<'_> {
     }
 }
 
-/// Reason for which a sensor reads 0 for every contact.
+/// Reason for which a sensor reads 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InsensitiveSensor {
-    /// A support of a beam fixes the measured quantity.
+    /// A beam's support fixes the measured quantity.
     #[error("{} there", held(*kind))]
     Held {
-        /// Quantity that the sensor measures.
+        /// Measured quantity.
         kind: SensorKind,
     },
-    /// The edge of a plate fixes the measured quantity.
+    /// A plate's edge fixes the measured quantity.
     #[error("the {edge} edge, which is {held}, has no {kind} for any contact")]
     AtEdge {
         /// Name of the edge.
         edge: &'static str,
-        /// Condition along that edge.
+        /// Edge condition.
         held: &'static str,
-        /// Quantity that the sensor measures.
+        /// Measured quantity.
         kind: SensorKind,
     },
-    /// The deflection of a plate over a rigid support.
+    /// A rigid support prevents deflection.
     #[error("simple support {number} keeps the plate from deflecting there")]
     AtSupport {
-        /// Number of the support, from 1.
+        /// Number of the support.
         number: usize,
     },
 }
 
-/// Text of the reason for which a beam's sensor of this kind reads 0.
 fn held(kind: SensorKind) -> &'static str {
     match kind {
         SensorKind::Deflection => "a support fixes the surface",
@@ -239,19 +232,19 @@ fn held(kind: SensorKind) -> &'static str {
     }
 }
 
-/// The description of a surface.
+/// Description of a surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SurfaceSpec {
     /// A simply supported beam.
     Beam(Beam),
-    /// A beam on any supports, with any sections.
+    /// A beam with any supports and sections.
     SupportedBeam(Box<SupportedBeam>),
     /// A rectangular plate.
     Plate(Plate),
-    /// A flexible cantilever finger.
+    /// A cantilever finger.
     Digit(Digit),
-    /// A surface without a model, for which only recordings exist.
+    /// A surface without a model.
     Measured(Extent),
 }
 
@@ -286,7 +279,7 @@ impl From<Extent> for SurfaceSpec {
 }
 
 impl SurfaceSpec {
-    /// The extent of the surface.
+    /// Extent of the surface.
     pub fn extent(&self) -> Extent {
         match self {
             Self::Beam(beam) => beam.extent(),
@@ -297,7 +290,7 @@ impl SurfaceSpec {
         }
     }
 
-    /// The mechanics of the surface; `None` without a model.
+    /// Model, if any.
     pub fn model(&self) -> Option<&dyn Surface> {
         match self {
             Self::Beam(beam) => Some(beam),
@@ -309,7 +302,6 @@ impl SurfaceSpec {
     }
 }
 
-/// A straight strip of rectangular section.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Strip {
     length_m: f64,
@@ -319,13 +311,11 @@ struct Strip {
 }
 
 impl Strip {
-    /// Checks that length, width, thickness and Young's modulus are positive and finite; `names` are for the error.
     fn check(&self, names: [&'static str; 4]) -> Result<(), OutOfRange> {
         let values = [self.length_m, self.width_m, self.thickness_m, self.youngs_modulus_pa];
         OutOfRange::check_positive(names.into_iter().zip(values))
     }
 
-    /// E·I in N·m², with I = width·t³/12.
     fn bending_stiffness(&self) -> f64 {
         self.youngs_modulus_pa * self.width_m * self.thickness_m.powi(3) / 12.0
     }

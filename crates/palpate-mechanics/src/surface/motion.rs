@@ -1,15 +1,14 @@
-//! A contact that moves back and forth.
+//! Moving contacts.
 
 use std::f64::consts::PI;
 
 use crate::contact::{Contact, Position};
 use palpate_numerics::OutOfRange;
 
-/// A contact that moves between two places and back along a straight line, for a number of passes.
+/// A contact that moves back and forth along a straight line.
 ///
-/// A pass starts and ends at rest. At either end the speed rises and falls as (1 − cos)/2 over `turn_m`, without a
-/// jump in the acceleration. Between the ends it is constant. A turn of length s at speed v takes 2s/v and has an acceleration of
-/// πv²/(4s) at most. Between passes the contact is lifted for `lifted_s`; its release and its return take `touch_s` each.
+/// Over `turn_m` at either end the speed changes as (1 − cos)/2, with acceleration ≤ πv²/(4·turn_m). Between
+/// passes the contact is lifted for `lifted_s`, with transitions of `touch_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     from: Position,
@@ -21,17 +20,18 @@ pub struct Motion {
     touch_s: f64,
 }
 
-/// Straight pieces of a turn: their error is within π/(8·200²) = 10⁻⁵ of its length, and that of the force within 1.6·10⁻⁵ of it.
+/// Pieces of a turn: the error is π/(8·200²) = 10⁻⁵ of its length, or 1.6·10⁻⁵ of the force.
 const PIECES: usize = 200;
 
-/// Time before and after a sudden change of the force, in seconds.
+/// Duration of a sudden change of force.
 const AT_ONCE_S: f64 = 1e-9;
 
 impl Motion {
-    /// One pass from a place to another one, with turns of `turn_m` metres at both ends and a constant speed between them.
+    /// Creates one pass.
     ///
     /// # Errors
-    /// [`OutOfRange`] unless the distance and the speed are greater than 0, and the turn is greater than 0 and at most half the distance.
+    /// [`OutOfRange`] unless distance and speed are positive, and the turn is positive and at most half the
+    /// distance.
     ///
     /// ```
     /// use palpate_mechanics::contact::Position;
@@ -45,27 +45,26 @@ impl Motion {
         Self { from, to, speed_m_per_s, turn_m, passes: 1, lifted_s: 0.0, touch_s: 0.0 }.checked()
     }
 
-    /// This motion with another constant speed, in m/s.
+    /// Sets the constant speed.
     ///
     /// # Errors
-    /// [`OutOfRange`] unless the speed is greater than 0 and finite.
+    /// [`OutOfRange`].
     pub fn with_speed(self, speed_m_per_s: f64) -> Result<Self, OutOfRange> {
         Self { speed_m_per_s, ..self }.checked()
     }
 
-    /// This motion with `passes` passes, in alternating directions.
+    /// Sets the number of passes.
     ///
     /// # Errors
-    /// [`OutOfRange`] for no passes.
+    /// [`OutOfRange`].
     pub fn with_passes(self, passes: usize) -> Result<Self, OutOfRange> {
         Self { passes, ..self }.checked()
     }
 
-    /// This motion with the surface untouched for `lifted_s` seconds between two passes (0 for a permanent contact). The force takes
-    /// `touch_s` seconds to fall before that and to rise after it.
+    /// Sets the time without contact between passes, and that of each fall and rise of the force.
     ///
     /// # Errors
-    /// [`OutOfRange`] for a time that is negative or not finite.
+    /// [`OutOfRange`].
     pub fn with_lifts(self, lifted_s: f64, touch_s: f64) -> Result<Self, OutOfRange> {
         Self { lifted_s, touch_s, ..self }.checked()
     }
@@ -84,13 +83,12 @@ impl Motion {
         Ok(self)
     }
 
-    /// Duration in seconds.
+    /// Duration.
     pub fn duration_s(&self) -> f64 {
         self.passes as f64 * self.pass_s() + (self.passes - 1) as f64 * self.rest_s()
     }
 
-    /// The contact at `time_s`, clamped to the duration of the motion. The force is `force_n`, in newtons, or less while the contact is
-    /// lifted.
+    /// Returns the contact at `time_s`, clamped to the duration, with the force `force_n` or less.
     pub fn contact_at(&self, time_s: f64, force_n: f64) -> Contact {
         let time_s = time_s.clamp(0.0, self.duration_s());
         let cycle_s = self.pass_s() + self.rest_s();
@@ -107,8 +105,7 @@ impl Motion {
         }
     }
 
-    /// Instants after `from_s` and before `to_s`, ascending, at which a path of straight pieces must break to follow the motion:
-    /// each turn, and each fall or rise of the force, has 200 pieces. Between them the motion is linear.
+    /// Instants between which the motion is linear to 1/200 of each turn and change of force.
     pub fn breaks_s(&self, from_s: f64, to_s: f64) -> Vec<f64> {
         let cycle_s = self.pass_s() + self.rest_s();
         let pass_at = |time_s: f64| ((time_s / cycle_s).max(0.0) as usize).min(self.passes - 1);
@@ -126,8 +123,6 @@ impl Motion {
         breaks
     }
 
-    /// Intervals, from the start of a pass, in which its contact accelerates or slows down, and in which its force falls or rises
-    /// after it. A sudden change of the force lies within [`AT_ONCE_S`] of its instant.
     fn curved_s(&self, pass: usize) -> [Option<[f64; 2]>; 4] {
         let (turn_s, pass_s, rest_s) = (self.turn_s(), self.pass_s(), self.rest_s());
         let is_lifted = rest_s > 0.0 && pass + 1 < self.passes;
@@ -147,7 +142,6 @@ impl Motion {
         self.from.distance_m(self.to)
     }
 
-    /// Duration of a turn, in seconds.
     fn turn_s(&self) -> f64 {
         2.0 * self.turn_m / self.speed_m_per_s
     }
@@ -160,7 +154,6 @@ impl Motion {
         if self.lifted_s > 0.0 { self.lifted_s + 2.0 * self.touch_s } else { 0.0 }
     }
 
-    /// Distance since the start of a pass, in metres, `since_s` seconds after it.
     fn way_m(&self, since_s: f64) -> f64 {
         let (turn_s, left_s) = (self.turn_s(), self.pass_s() - since_s);
         let turning = |t: f64| 0.5 * self.speed_m_per_s * (t - turn_s / PI * (PI * t / turn_s).sin());
@@ -173,7 +166,7 @@ impl Motion {
         }
     }
 
-    /// The share of the force at a time after the end of a pass: it falls, is 0, and rises, each as (1 ± cos)/2.
+    /// Share of the force after a pass; it changes as (1 ± cos)/2.
     fn pressed(&self, rest_s: f64) -> f64 {
         if rest_s <= 0.0 || self.lifted_s <= 0.0 {
             return 1.0;

@@ -57,7 +57,7 @@ proptest! {
         prop_assert!((0.5 * PAPER.thickness_m() * difference - strain).abs() < kink * PAPER.full_scale(SensorKind::Strain));
     }
 
-    /// ∫ E·I·y''·φ'' dx = −φ(a) for every φ that vanishes with its second derivative on the supports: here sin(kπx/l).
+    /// ∫ E·I·y″·φ″ dx = −φ(a) for φ = sin(kπx/l), which vanishes with its second derivative on the supports.
     #[test]
     fn stiffness_times_the_fourth_derivative_is_the_load_weakly(k in 1..8u32, a in 0.01..0.39) {
         let wave = f64::from(k) * std::f64::consts::PI / PAPER.length_m();
@@ -79,7 +79,7 @@ proptest! {
     #[test]
     fn the_closed_gradient_is_the_differenced_one(x in 0.0..=0.4_f64, a in 0.0..=0.4_f64) {
         const STEP_M: f64 = 4e-6;
-        // The strain has a kink over the sensor, and so has the derivative of the slope.
+        // The strain and the derivative of the slope have a kink over the sensor.
         prop_assume!((x - a).abs() > 2.0 * STEP_M && (STEP_M..=0.4 - STEP_M).contains(&a));
         for kind in SensorKind::ALL {
             let (sensor, contact) = (Position::along(x), Position::along(a));

@@ -1,23 +1,21 @@
-//! Predictions from points in blocks of eight: correlations with a place, weighted sums, and products with triangles.
+//! Predictions in blocks of eight points.
 
 use super::Kernel;
 use crate::simd::{Arithmetic, InstructionSet, Kernel as Work, Simd, Vector};
 use ndarray::{Array2, ArrayView2};
 
-/// Points and their weights in blocks of eight.
 #[derive(Clone, Debug)]
 pub(super) struct Blocks {
     kernel: Kernel,
     coordinates: usize,
     outputs: usize,
-    /// u of eight points, coordinate by coordinate, block by block; the last block is padded with zeros.
+    /// u by block and coordinate.
     points: Vec<[f64; 8]>,
-    /// α of eight points, output by output, block by block, padded with zeros.
+    /// α by block and output.
     weights: Vec<[f64; 8]>,
 }
 
 impl Blocks {
-    /// Blocks from u, d×n, and α, m×n.
     pub fn new(kernel: Kernel, scaled: &ArrayView2<f64>, weights: &ArrayView2<f64>) -> Self {
         Self {
             kernel,
@@ -28,19 +26,17 @@ impl Blocks {
         }
     }
 
-    /// Number of blocks.
     pub fn len(&self) -> usize {
         self.points.len() / self.coordinates.max(1)
     }
 
-    /// Writes the correlation of every point with the place u, and Σ α_i·c_i of every output.
+    /// Correlations with u, and Σ α_i·c_i of every output.
     pub fn sums_into(&self, u: &[f64], correlations: &mut [[f64; 8]], sums: &mut [f64]) {
         let work = Sums { blocks: self, u, correlations, sums };
         InstructionSet::best().run(work);
     }
 }
 
-/// Columns of a matrix in blocks of eight.
 fn in_blocks(matrix: &ArrayView2<f64>) -> Vec<[f64; 8]> {
     let (rows, columns) = matrix.dim();
     let mut blocks = vec![[0.0; 8]; rows * columns.div_ceil(8)];
@@ -72,7 +68,6 @@ impl Work for Sums<'_> {
 }
 
 impl Sums<'_> {
-    /// Number of blocks of outputs with their sums in registers.
     const OUTPUTS: usize = 4;
 
     #[inline(always)]
@@ -122,15 +117,12 @@ fn squared_exponential<V: Vector<8, Real = f64>>(r2: V) -> V {
     (V::splat(-0.5) * r2).exponential()
 }
 
-/// A lower triangle, with its rows in blocks of eight.
 #[derive(Clone, Debug)]
 pub(super) struct Triangle {
-    /// Each block column by column, up to the diagonal of its last row; rows beyond the last are 0.
     blocks: Vec<Vec<[f64; 8]>>,
 }
 
 impl Triangle {
-    /// The lower triangle of a matrix.
     pub fn new(matrix: &ArrayView2<f64>) -> Self {
         let size = matrix.nrows();
         let block = |first: usize| {
@@ -145,7 +137,7 @@ impl Triangle {
         Self { blocks: (0..size).step_by(8).map(block).collect() }
     }
 
-    /// T·x into the first numbers of `out`, in blocks; the length of x is the size of the triangle. Returns |T·x|².
+    /// Writes T·x and returns |T·x|².
     pub fn product_into(&self, x: &[f64], out: &mut [[f64; 8]]) -> f64 {
         InstructionSet::best().run(Product { triangle: self, x, out })
     }
@@ -187,7 +179,7 @@ impl Work for Product<'_> {
     }
 }
 
-/// Correlations of places (rows) with points (columns); both arguments are d×….
+/// Correlations of places (rows) with points (columns).
 pub(super) fn cross_correlations(
     kernel: Kernel,
     places: &ArrayView2<f64>,

@@ -1,9 +1,7 @@
 //! The factored covariance of the rows.
 //!
-//! With S = C + b²·H·Hᵀ the signal's covariance over s² and D the noise's, C_ij = c(x_i, x_j), every computation needs
-//! P = (K + b²·H·Hᵀ)⁻¹, K = C + D. The matrix inversion lemma gives it from the factors of K, n×n, and of
-//! A = Hᵀ·K⁻¹·H + I/b², q×q: P = K⁻¹ − K⁻¹·H·A⁻¹·Hᵀ·K⁻¹ (Rasmussen and Williams, section 2.7). b² is never
-//! added to C, so the trend's prior can be broad without a loss of digits.
+//! With C_ij = c(x_i, x_j), noise D and K = C + D, P = (K + b²·H·Hᵀ)⁻¹ = K⁻¹ − K⁻¹·H·A⁻¹·Hᵀ·K⁻¹, A =
+//! Hᵀ·K⁻¹·H + I/b², q×q (Rasmussen and Williams, section 2.7). A large b² costs no digits.
 
 use ndarray::{Array2, ArrayView2};
 
@@ -12,24 +10,22 @@ use super::kernel::squared_distances_into;
 use super::{Kernel, Trend};
 use crate::{Cholesky, NotPositiveDefinite};
 
-/// b²: the prior variance of the trend's coefficients over the signal's, for standardized coordinates.
+/// b², the trend's prior variance over s².
 pub(super) const TREND_VARIANCE: f64 = 1e8;
-/// Addition to the diagonal of C, so that a covariance without noise has a factor despite rounding.
+/// Nugget against rounding.
 pub(super) const NUGGET: f64 = 1e-12;
-/// Largest such addition.
 const LARGEST_NUGGET: f64 = 1e-6;
 
-/// Points of the rows, scaled for a covariance.
 #[derive(Clone, Debug)]
 pub(super) struct Points {
-    /// u = (x − centre)/ℓ, d×n.
+    /// (x − centre)/ℓ, d×n.
     pub scaled: Array2<f64>,
     /// H, n×q.
     pub basis: Array2<f64>,
 }
 
 impl Points {
-    /// Points from coordinates, d×n, their centre and spread, and the length scales.
+    /// Scales coordinates, d×n.
     pub fn new(
         coordinates: &ArrayView2<f64>,
         centre: &[f64],
@@ -44,12 +40,11 @@ impl Points {
         Self { scaled: over(length_scales), basis: trend.basis(&over(spread).view()) }
     }
 
-    /// All points of `groups`.
     pub fn of_groups(groups: &Groups, length_scales: &[f64], trend: Trend) -> Self {
         Self::new(&groups.coordinates.view(), &groups.centre, &groups.spread, length_scales, trend)
     }
 
-    /// C, and dC/d(r²) into `slopes`; lower triangles.
+    /// C; dC/d(r²) into `slopes`.
     pub fn correlations(&self, kernel: Kernel, mut slopes: Option<&mut Array2<f64>>) -> Array2<f64> {
         let n = self.scaled.ncols();
         let mut c = Array2::zeros((n, n));
@@ -69,22 +64,17 @@ impl Points {
     }
 }
 
-/// K + b²·H·Hᵀ in factors.
 #[derive(Clone, Debug)]
 pub(super) struct Covariance {
-    /// Factor L of K = L·Lᵀ.
+    /// L of K = L·Lᵀ.
     pub factor: Cholesky,
     /// L⁻¹·H, n×q.
     pub basis: Array2<f64>,
-    /// Factor of A.
     pub trend: Cholesky,
 }
 
 impl Covariance {
-    /// The factors from the lower triangle of C, the noise variance of every row over the signal's, and H.
-    ///
-    /// # Errors
-    /// [`NotPositiveDefinite`] when no factor exists because of rounding.
+    /// Factors the lower triangle of C with relative noise, and H.
     pub fn new(
         mut correlations: Array2<f64>,
         noise: &[f64],
@@ -102,10 +92,7 @@ impl Covariance {
         Ok(Self { factor, basis, trend })
     }
 
-    /// Factors as [`Self::new`] does, with the smallest sufficient nugget.
-    ///
-    /// # Errors
-    /// [`NotPositiveDefinite`] when even the largest nugget is insufficient.
+    /// Factors with the smallest sufficient nugget.
     pub fn regularised(points: &Points, kernel: Kernel, noise: &[f64]) -> Result<Self, NotPositiveDefinite> {
         let mut nugget = NUGGET;
         loop {
@@ -122,7 +109,7 @@ impl Covariance {
         self.factor.log_determinant() + self.trend.log_determinant() + terms * TREND_VARIANCE.ln()
     }
 
-    /// α = P·y and the trend's coefficients β = A⁻¹·Hᵀ·K⁻¹·y, for each column of y, n×m: n×m and q×m.
+    /// α = P·y, n×m, and β = A⁻¹·Hᵀ·K⁻¹·y, q×m.
     pub fn solve(&self, outputs: &Array2<f64>) -> (Array2<f64>, Array2<f64>) {
         let half = self.factor.solve_lower_matrix(outputs.as_standard_layout().into_owned());
         let beta = self.trend.solve_matrix(self.basis.t().dot(&half));
@@ -130,7 +117,6 @@ impl Covariance {
         (alpha, beta)
     }
 
-    /// P.
     pub fn inverse(&self) -> Array2<f64> {
         let inverse_lower = self.factor.inverse_lower();
         let mut p = Cholesky::gram_of_lower(&inverse_lower);
@@ -141,8 +127,7 @@ impl Covariance {
     }
 }
 
-/// Factors A. For collinear coordinates only 1/b² keeps A regular, and rounding can remove it; then a small multiple of the trace is
-/// added.
+/// Adds a share of the trace where rounding removes 1/b², as for collinear coordinates.
 fn factor_with_nugget(a: &Array2<f64>) -> Result<Cholesky, NotPositiveDefinite> {
     let trace = a.diag().sum();
     let mut added = 1e-15;

@@ -1,13 +1,13 @@
-//! The log evidence of some samples, and its gradient.
+//! The log evidence and its gradient.
 //!
-//! Let s_j²·(S + η·V) be the total covariance of the N original rows of output j, with their relative noise
-//! variances V. Then ln p(y_j) = −½·(N·ln 2πs_j² + ln det(S + η·V) + y_jᵀ·(S + η·V)⁻¹·y_j / s_j²) (Rasmussen and Williams, eq.
-//! 5.8). Collapsing the rows of one point into groups (n of them, precision p_i, scatter Σ_i) gives
+//! With the covariance s_j²·(S + η·V) of the N rows of output j, V their relative noise variances, ln p(y_j)
+//! = −½·(N·ln 2πs_j² + ln det(S + η·V) + y_jᵀ·(S + η·V)⁻¹·y_j / s_j²) (Rasmussen and Williams, eq. 5.8).
+//! Collapsed to n groups of precision p_i and scatter Σ_i:
 //!
-//! - ln det(S + η·V) = ln det(S + η·D) + (N − n)·ln η + Σ ln p_i + Σ ln v_r, with D = diag(1/p_i), and
-//! - the quadratic form Q_j = ȳ_jᵀ·P·ȳ_j + Σ_i scatter_ij/η, with P = (S + η·D)⁻¹.
+//! - ln det(S + η·V) = ln det(S + η·D) + (N − n)·ln η + Σ ln p_i + Σ ln v_r, D = diag(1/p_i);
+//! - Q_j = ȳ_jᵀ·P·ȳ_j + Σ_i scatter_ij/η, P = (S + η·D)⁻¹.
 //!
-//! Where the noise is fitted, every s_j² has its optimum, s_j² = Q_j/N. Where it is given in units of the outputs, s² = 1/η.
+//! Fitted noise: s_j² = Q_j/N. Given noise: s² = 1/η.
 
 use std::f64::consts::PI;
 
@@ -18,10 +18,9 @@ use super::groups::Groups;
 use super::{Hyperparameters, Kernel, Trend};
 use crate::NotPositiveDefinite;
 
-/// Addition to every Q_j, so that an output without any variance has a logarithm; outputs are of order 1 there.
+/// Nugget of Q_j against ln 0; outputs are of order 1.
 const LEAST_QUADRATIC: f64 = 1e-10;
 
-/// Samples and model of an evidence.
 pub(super) struct Evidence<'a> {
     pub groups: &'a Groups,
     pub kernel: Kernel,
@@ -29,10 +28,7 @@ pub(super) struct Evidence<'a> {
 }
 
 impl Evidence<'_> {
-    /// ln p of all outputs, and its gradient with respect to the logarithms of the hyperparameters.
-    ///
-    /// # Errors
-    /// [`NotPositiveDefinite`] where the covariance has no factor because of rounding.
+    /// ln p, and its gradient by logarithms of the hyperparameters.
     pub fn with_gradient(
         &self,
         hyperparameters: &Hyperparameters,
@@ -69,12 +65,11 @@ impl Evidence<'_> {
     }
 }
 
-/// s_j² for each output, given α = P·ȳ, in the groups' standardized units.
+/// Standardized s_j².
 pub(super) fn signal_variances(groups: &Groups, ratio: f64, alpha: &Array2<f64>) -> Vec<f64> {
     variances_of(groups, ratio, &quadratic_forms(groups, ratio, alpha))
 }
 
-/// s_j² for each output, given Q_j.
 pub(super) fn variances_of(groups: &Groups, ratio: f64, quadratics: &[f64]) -> Vec<f64> {
     if groups.noise_given {
         return vec![1.0 / ratio; groups.means.ncols()];
@@ -83,12 +78,12 @@ pub(super) fn variances_of(groups: &Groups, ratio: f64, quadratics: &[f64]) -> V
     quadratics.iter().map(|q| q / rows).collect()
 }
 
-/// ln p of all outputs in their own units, given α = P·ȳ.
+/// ln p of all outputs.
 pub(super) fn log_evidence(groups: &Groups, ratio: f64, covariance: &Covariance, alpha: &Array2<f64>) -> f64 {
     evidence_of(groups, ratio, covariance.log_determinant(), &quadratic_forms(groups, ratio, alpha))
 }
 
-/// ln p of all outputs in their own units, given the logarithm of the points' determinant and Q_j.
+/// ln p from the points' determinant and Q_j.
 pub(super) fn evidence_of(groups: &Groups, ratio: f64, log_determinant: f64, quadratics: &[f64]) -> f64 {
     let rows = groups.total_rows() as f64;
     let repeats = rows - groups.len() as f64;
@@ -103,14 +98,14 @@ pub(super) fn evidence_of(groups: &Groups, ratio: f64, log_determinant: f64, qua
     (0..quadratics.len()).map(of_output).sum()
 }
 
-/// Q_j, given α = P·ȳ.
+/// Q_j.
 fn quadratic_forms(groups: &Groups, ratio: f64, alpha: &Array2<f64>) -> Vec<f64> {
     let of_means: Vec<f64> =
         groups.means.columns().into_iter().zip(alpha.columns()).map(|(y, alpha)| y.dot(&alpha)).collect();
     with_scatter(groups, ratio, &of_means)
 }
 
-/// Q_j, given the contribution of the means of the points.
+/// Q_j from ȳ_jᵀ·P·ȳ_j.
 pub(super) fn with_scatter(groups: &Groups, ratio: f64, of_means: &[f64]) -> Vec<f64> {
     let least = if groups.noise_given { 0.0 } else { LEAST_QUADRATIC };
     let of_output =

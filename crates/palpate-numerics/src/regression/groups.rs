@@ -1,4 +1,4 @@
-//! Samples, checked and collapsed to one group for every distinct point.
+//! Samples, checked and grouped by distinct points.
 
 use std::cmp::Ordering;
 
@@ -6,53 +6,46 @@ use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
 
 use super::RegressionError;
 
-/// Samples: coordinates, outputs and noise of n rows.
+/// Samples of n rows.
 #[derive(Clone, Copy, Debug)]
 pub struct Samples<'a> {
-    /// x, n×d: one row for each sample, one column for each coordinate; finite.
+    /// x, n×d, finite.
     pub coordinates: ArrayView2<'a, f64>,
-    /// y, n×m: one column for each output; finite.
+    /// y, n×m, finite.
     pub outputs: ArrayView2<'a, f64>,
-    /// The noise variance of every row, in the square of the outputs' unit and equal for all outputs, at least 0;
-    /// `None` to fit one variance for all rows.
+    /// Noise variance of every row; `None` to fit it.
     pub noise_variance: Option<&'a [f64]>,
 }
 
-/// The n distinct points of some samples, in the order of their first rows.
+/// Distinct points.
 ///
-/// Rows r of a point with relative noise variances v_r (1 where the noise is fitted) become one row of precision
-/// p = Σ 1/v_r, mean ȳ = Σ y_r/v_r / p and scatter Σ (y_r − ȳ)²/v_r.
+/// Rows of relative noise v_r collapse to precision p = Σ 1/v_r, mean ȳ = Σ y_r/v_r / p and scatter Σ
+/// (y_r − ȳ)²/v_r.
 #[derive(Clone, Debug)]
 pub(super) struct Groups {
-    /// d×n, in their own units.
     pub coordinates: Array2<f64>,
-    /// Mean of each coordinate over the points.
+    /// Mean of each coordinate.
     pub centre: Vec<f64>,
-    /// Standard deviation of each coordinate over the points; 1 where it does not vary.
+    /// Standard deviation, or 1.
     pub spread: Vec<f64>,
-    /// ȳ, n×m, minus the offset and divided by the scale.
+    /// ȳ, n×m, standardized.
     pub means: Array2<f64>,
-    /// n×m, over the square of the scale.
     pub scatter: Array2<f64>,
-    /// p, n values.
     pub precision: Vec<f64>,
-    /// Number of rows of each group.
     pub rows: Vec<usize>,
-    /// Σ ln v_r of each group.
+    /// Σ ln v_r.
     pub log_variance: Vec<f64>,
-    /// Value subtracted from each output.
+    /// Mean of each output.
     pub offset: Vec<f64>,
-    /// Divisor of each output; 1 where the noise is given, which is in the outputs' unit.
+    /// Divisor of each output; 1 for given noise.
     pub scale: Vec<f64>,
-    /// True when the noise of every row was given.
     pub noise_given: bool,
 }
 
-/// Smallest noise variance of a row, over the outputs' mean square about their means: the size of rounding errors.
+/// Rounding error, relative to the outputs' variance.
 const LEAST_VARIANCE: f64 = 1e-14;
 
 impl Groups {
-    /// Checks and collapses samples.
     pub fn new(samples: Samples) -> Result<Self, RegressionError> {
         check(samples)?;
         let outputs = samples.outputs;
@@ -75,22 +68,20 @@ impl Groups {
         Ok(groups)
     }
 
-    /// Number of groups, n.
     pub fn len(&self) -> usize {
         self.rows.len()
     }
 
-    /// Number of rows in all groups, N.
     pub fn total_rows(&self) -> usize {
         self.rows.iter().sum()
     }
 
-    /// Noise variance of each group over the signal's, η/p_i, for a single row's η = `ratio`.
+    /// η/p_i for η = `ratio`.
     pub fn noise_ratios(&self, ratio: f64) -> Vec<f64> {
         self.precision.iter().map(|p| ratio / p).collect()
     }
 
-    /// Mean square of the standardized outputs, averaged over outputs.
+    /// Mean square of standardized outputs.
     pub fn mean_square(&self) -> f64 {
         let weights = self.rows.iter().map(|rows| *rows as f64);
         let sum: f64 =
@@ -98,7 +89,6 @@ impl Groups {
         sum / (self.total_rows() * self.means.ncols()) as f64
     }
 
-    /// The groups with these indices.
     pub fn subset(&self, chosen: &[usize]) -> Self {
         Self {
             coordinates: self.coordinates.select(Axis(1), chosen),
@@ -140,29 +130,28 @@ fn collapse(coordinates: &ArrayView2<f64>, outputs: &Array2<f64>, relative: &[f6
             let mean = weighted.sum::<f64>() / groups.precision[i];
             let scatter = rows.iter().map(|r| (outputs[[*r, j]] - mean).powi(2) / relative[*r]);
             groups.means[[i, j]] = mean;
-            // The scatter of a single row is 0; the division may leave a rounding error.
+            // The scatter of a single row is 0, except for rounding.
             groups.scatter[[i, j]] = if rows.len() > 1 { scatter.sum() } else { 0.0 };
         }
     }
     groups
 }
 
-/// Mean and variance of every lane of a table.
 fn moments(table: &ArrayView2<f64>, axis: Axis) -> (Vec<f64>, Vec<f64>) {
     let moments = |lane: ArrayView1<f64>| {
         let count = lane.len() as f64;
         let mean = lane.sum() / count;
         let variance = lane.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count;
-        // The variance of equal values is 0, but may contain a rounding error.
+        // The variance of equal values is 0, except for rounding.
         let rounding = (4.0 * f64::EPSILON * mean).powi(2);
         (mean, if variance > rounding { variance } else { 0.0 })
     };
     table.axis_iter(axis).map(moments).unzip()
 }
 
-/// Rows of each distinct point; points in the order of their first rows.
+/// Rows of distinct points, in the order of first rows.
 fn members(coordinates: &ArrayView2<f64>) -> Vec<Vec<usize>> {
-    // −0 and 0 are the same place.
+    // −0 and 0 are equal.
     let order = |a: &usize, b: &usize| {
         let (a, b) = (coordinates.row(*a), coordinates.row(*b));
         let by_coordinate = a.iter().zip(b).map(|(a, b)| (a + 0.0).total_cmp(&(b + 0.0)));

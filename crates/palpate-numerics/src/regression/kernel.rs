@@ -1,29 +1,29 @@
-//! Covariance functions, trends and their hyperparameters.
+//! Covariance functions, trends and hyperparameters.
 
 use ndarray::{Array2, ArrayView2};
 
 use super::RegressionError;
 
-/// A correlation of two points as a function of r² = Σ_k ((x_k − x′_k)/ℓ_k)², with a length scale ℓ_k for each coordinate.
+/// Correlation as a function of r² = Σ_k ((x_k − x′_k)/ℓ_k)².
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kernel {
-    /// c = (1 + √5·r + 5r²/3)·e^(−√5·r): functions with two derivatives (Rasmussen and Williams, eq. 4.17).
+    /// c = (1 + √5·r + 5r²/3)·e^(−√5·r) (Rasmussen and Williams, eq. 4.17).
     #[default]
     Matern52,
-    /// c = (1 + √3·r)·e^(−√3·r): functions with one derivative (their eq. 4.17, ν = 3/2).
+    /// c = (1 + √3·r)·e^(−√3·r) (eq. 4.17, ν = 3/2).
     Matern32,
-    /// c = e^(−r²/2): functions with every derivative (their eq. 4.9).
+    /// c = e^(−r²/2) (eq. 4.9).
     SquaredExponential,
 }
 
 impl Kernel {
-    /// c, for r² ≥ 0.
+    /// c(r²).
     pub fn correlation(self, r2: f64) -> f64 {
         self.correlation_and_slope(r2).0
     }
 
-    /// c and dc/d(r²), for r² ≥ 0. All kernels have a finite slope at 0.
+    /// c and dc/d(r²).
     pub fn correlation_and_slope(self, r2: f64) -> (f64, f64) {
         match self {
             Self::Matern52 => {
@@ -45,19 +45,18 @@ impl Kernel {
     }
 }
 
-/// Mean function: the limit of a prediction far from every row.
+/// Mean function.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Trend {
-    /// h = (1): the limit is a constant.
+    /// h = (1).
     #[default]
     Constant,
-    /// h = (1, z_1 … z_d), z the coordinates standardized: the limit is a plane.
+    /// h = (1, z_1 … z_d), with standardized coordinates z.
     Linear,
 }
 
 impl Trend {
-    /// Length of h for `coordinates` coordinates.
     pub(super) fn size(self, coordinates: usize) -> usize {
         match self {
             Self::Constant => 1,
@@ -65,7 +64,7 @@ impl Trend {
         }
     }
 
-    /// h at every row, n×q, for standardized coordinates, d×n.
+    /// h, n×q, for standardized coordinates, d×n.
     pub(super) fn basis(self, standardized: &ArrayView2<f64>) -> Array2<f64> {
         let (coordinates, rows) = standardized.dim();
         Array2::from_shape_fn((rows, self.size(coordinates)), |(row, term)| match term {
@@ -75,19 +74,17 @@ impl Trend {
     }
 }
 
-/// Length scales of the functions, which determine their smoothness, and noise ratio of the rows.
+/// Hyperparameters of a Gaussian process.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hyperparameters {
-    /// ℓ_k, one for each coordinate, in the coordinate's unit; greater than 0.
+    /// ℓ_k > 0.
     pub length_scales: Vec<f64>,
-    /// η, greater than 0: the noise variance of a row over the signal variance s². Where the noise of every row is
-    /// given, it is 1/s², in the unit of 1 over the outputs' square.
+    /// η > 0, a row's noise variance over s²; for given noise 1/s².
     pub noise_ratio: f64,
 }
 
 impl Hyperparameters {
-    /// Checks the hyperparameters for rows of `coordinates` coordinates.
     pub(super) fn check(&self, coordinates: usize) -> Result<(), RegressionError> {
         let found = self.length_scales.len();
         if found != coordinates {
@@ -105,7 +102,7 @@ impl Hyperparameters {
         Ok(())
     }
 
-    /// Hyperparameters from their logarithms: those of the length scales, then that of the noise ratio.
+    /// Hyperparameters from logarithms, the noise ratio last.
     pub(super) fn from_logarithms(logarithms: &[f64]) -> Self {
         let mut values: Vec<f64> = logarithms.iter().map(|value| value.exp()).collect();
         let noise_ratio = values.pop().unwrap_or(1.0);
@@ -113,7 +110,7 @@ impl Hyperparameters {
     }
 }
 
-/// r² from a point to the first `out.len()` rows, all divided by their length scales; rows are d×n.
+/// Distances r² from a point to the first scaled rows, d×n.
 pub(super) fn squared_distances_into(out: &mut [f64], rows: &ArrayView2<f64>, point: impl Fn(usize) -> f64) {
     out.fill(0.0);
     for (k, coordinate) in rows.outer_iter().enumerate() {

@@ -1,45 +1,35 @@
-//! Minimisation of a smooth function of a few variables: L-BFGS (Nocedal and Wright, *Numerical Optimization*, algorithm
-//! 7.5) with a backtracking line search.
+//! L-BFGS (Nocedal and Wright, *Numerical Optimization*, algorithm 7.5) with a backtracking line search.
 
 use std::collections::VecDeque;
 
 use crate::small::{add_multiple, dot};
 
-/// Number of stored pairs of steps and gradient changes.
 const MEMORY: usize = 12;
-/// Largest change of a variable in one step; the variables are logarithms, so it is a factor of 7.
+/// Largest change of a logarithm.
 const LONGEST_STEP: f64 = 2.0;
-/// Smallest decrease of a step, as a share of the decrease that the gradient predicts.
+/// Share of the predicted decrease (Armijo).
 const SUFFICIENT: f64 = 1e-4;
 
-/// Stopping criterion of a minimisation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stop {
-    /// Largest number of evaluations.
+    /// Largest number.
     pub evaluations: usize,
     /// Smallest decrease in two consecutive steps.
     pub decrease: f64,
 }
 
-/// Result of a minimisation.
 #[derive(Clone, Debug)]
 pub(super) struct Minimum {
-    /// The variables.
     pub point: Vec<f64>,
-    /// The value of the function at the point.
     pub value: f64,
 }
 
-/// A step, and the change of the gradient over it.
 struct Pair {
     step: Vec<f64>,
     change: Vec<f64>,
 }
 
-/// Minimises from `start`. `function` writes its gradient and returns its value, or infinity where it is undefined.
-///
-/// # Errors
-/// The first error of `function`, which ends the search at once.
+/// Minimises `function`, which writes its gradient and returns its value, or infinity.
 pub(super) fn minimise<E>(
     start: &[f64],
     stop: Stop,
@@ -53,7 +43,7 @@ pub(super) fn minimise<E>(
     while value.is_finite() && evaluations < stop.evaluations && small_steps < 2 {
         let direction = direction(&gradient, &pairs);
         let slope = dot(&direction, &gradient);
-        // Not a descent direction: the stored pairs are outdated, or the gradient is rounding error.
+        // Not a descent direction: the pairs are outdated, or the gradient is rounding error.
         if slope >= 0.0 || !slope.is_finite() {
             if pairs.is_empty() {
                 break;
@@ -112,7 +102,7 @@ fn direction(gradient: &[f64], pairs: &VecDeque<Pair>) -> Vec<f64> {
     q
 }
 
-/// Factor that shortens a step to the minimum of the parabola through value, slope and next value.
+/// Factor to the minimum of the parabola.
 fn shrink(value: f64, slope: f64, next_value: f64) -> f64 {
     let curvature = next_value - value - slope;
     if next_value.is_finite() && curvature > 0.0 { (-0.5 * slope / curvature).clamp(0.1, 0.5) } else { 0.25 }

@@ -1,11 +1,8 @@
-//! Regression by Gaussian processes: smooth functions of a few coordinates from noisy samples, with their uncertainty.
+//! Gaussian process regression (Rasmussen and Williams, *Gaussian Processes for Machine Learning*, 2006,
+//! chapters 2, 4 and 5).
 //!
-//! f_j(x) = h(x)·β_j + g_j(x) for output j = 1…m. Here h is the [`Trend`]'s basis, β_j ~ N(0, s_j²·b²·I) with b² so
-//! large that it hardly matters, and g_j is a Gaussian process of covariance s_j²·c(x, x′), c a [`Kernel`]. The outputs
-//! share c, and each has its own signal variance s_j². A row is y_j = f_j(x) + noise.
-//!
-//! Rows at equal coordinates are collapsed to their weighted mean before any factorisation. This is exact: the
-//! posterior and the evidence are those of all rows, including the scatter of the repeats, so repeats determine the noise.
+//! f_j(x) = h(x)·β_j + g_j(x), j = 1…m, with [`Trend`] h, β_j ~ N(0, s_j²·b²·I), and g_j of covariance
+//! s_j²·c(x, x′), c a [`Kernel`]. A row is y_j = f_j(x) + noise. Repeated rows are collapsed exactly.
 //!
 //! ```
 //! use ndarray::Array2;
@@ -20,8 +17,6 @@
 //! assert!((mean[0] - 1.25f64.sin()).abs() < 1e-3 && variance[0] < 1e-4);
 //! # Ok::<(), palpate_numerics::regression::RegressionError>(())
 //! ```
-//!
-//! Rasmussen and Williams, *Gaussian Processes for Machine Learning* (2006), chapters 2, 4 and 5.
 
 mod blocks;
 mod covariance;
@@ -42,7 +37,7 @@ pub use search::Regression;
 use crate::NotPositiveDefinite;
 use crate::watch::Cancelled;
 
-/// Error of samples that no Gaussian process can be fitted to.
+/// Error of a fit.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RegressionError {
     /// Too few rows, coordinates or outputs.
@@ -52,55 +47,55 @@ pub enum RegressionError {
     Empty {
         /// Rows.
         rows: usize,
-        /// Coordinates of a row.
+        /// Coordinates.
         coordinates: usize,
-        /// Outputs of a row.
+        /// Outputs.
         outputs: usize,
     },
-    /// Lists of different lengths.
+    /// A list has the wrong length.
     #[error("there are {found} {what}; {needed} are needed")]
     Count {
-        /// Content of the list.
+        /// Name of the list.
         what: &'static str,
-        /// Length that the other lists require.
+        /// Required length.
         needed: usize,
-        /// Length of the list.
+        /// Length.
         found: usize,
     },
-    /// An infinite value, or NaN.
+    /// A value is not finite.
     #[error("{what} {column} of row {row} is {value}; it must be finite")]
     NotFinite {
         /// Coordinate or output.
         what: &'static str,
-        /// Index of the row, from 1.
+        /// Row, from 1.
         row: usize,
-        /// Index of the coordinate or output, from 1.
+        /// Column, from 1.
         column: usize,
-        /// The value.
+        /// Value.
         value: f64,
     },
-    /// A variance that is negative or not finite.
+    /// A variance is negative or not finite.
     #[error("the noise variance of row {row} is {value}; it must be finite and at least 0")]
     NoiseVariance {
-        /// Index of the row, from 1.
+        /// Row, from 1.
         row: usize,
-        /// The value.
+        /// Value.
         value: f64,
     },
-    /// A hyperparameter out of range.
+    /// A hyperparameter is out of range.
     #[error("{what} {number} is {value}; it must be finite and greater than 0")]
     Hyperparameter {
         /// Length scale or noise ratio.
         what: &'static str,
-        /// Index of the hyperparameter, from 1.
+        /// Index, from 1.
         number: usize,
-        /// The value.
+        /// Value.
         value: f64,
     },
-    /// The covariance matrix of the rows has no factor.
+    /// The covariance is not positive definite.
     #[error("the rows' covariance cannot be factored: {0}")]
     Singular(#[from] NotPositiveDefinite),
-    /// The search for hyperparameters was stopped.
+    /// The watch cancelled the work.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }

@@ -1,4 +1,4 @@
-//! The posterior of a Gaussian process, and its predictions.
+//! Posterior and predictions of a Gaussian process.
 
 use ndarray::linalg::general_mat_vec_mul;
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, ArrayViewMut1, Axis};
@@ -13,9 +13,7 @@ use super::{Hyperparameters, Kernel, RegressionError, Trend};
 use crate::watch::Watch;
 use crate::{Cholesky, NotPositiveDefinite};
 
-/// The posterior of m functions of d coordinates: exact up to [`MOST_EXACT`] points, beyond that with a thousand inducing points.
-///
-/// The serialized form contains only the data that cannot be recomputed.
+/// Posterior of m functions of d coordinates, exact up to [`MOST_EXACT`] points, otherwise sparse.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(into = "PosteriorData", try_from = "PosteriorData")]
 pub struct GaussianProcess {
@@ -27,26 +25,24 @@ pub struct GaussianProcess {
     weights: Array2<f64>,
     /// β, m×q.
     trend: Array2<f64>,
-    /// Covariance of the process at its points and of β over the signal's variance; only for a sparse process directly after its fit.
+    /// Posterior covariance at the points and of β, over s²; after a sparse fit.
     covariance: Option<Array2<f64>>,
 }
 
-/// Largest number of points with an exact posterior.
+/// Largest number of points of an exact posterior.
 pub const MOST_EXACT: usize = 4096;
-/// Largest number of points with an exact variance.
+/// Largest number of points of an exact variance.
 const MOST_EXACT_VARIANCE: usize = 512;
 
-/// Variance of a posterior.
 #[derive(Clone, Debug)]
 enum Variance {
-    /// From all points: L⁻¹, with L⁻¹·H and the factor of A.
+    /// L⁻¹, with L⁻¹·H and the factor of A.
     Exact { whiten: Triangle, basis: Array2<f64>, trend: Cholesky },
     /// From chosen points.
     Reduced(Reduced),
 }
 
 impl Variance {
-    /// The variance from all points if there are few enough, otherwise from chosen ones.
     fn of_points(
         points: &Points,
         kernel: Kernel,
@@ -68,21 +64,18 @@ impl Variance {
     }
 }
 
-/// Buffers for predictions of one [`GaussianProcess`].
+/// Buffers for predictions.
 #[derive(Clone, Debug)]
 pub struct PredictionScratch {
-    /// u.
     point: Vec<f64>,
-    /// h, then the part of it that the points do not explain.
+    /// h, then its unexplained part.
     basis: Vec<f64>,
-    /// The correlations with all points, in blocks.
     correlations: Vec<[f64; 8]>,
     reduced: ReducedScratch,
     /// dc/d(r²).
     slopes: Vec<f64>,
-    /// L⁻¹ times the correlations; or r², then the product of the slopes with u − u_i.
+    /// L⁻¹·c; or r², then slopes times u − u_i.
     product: Vec<[f64; 8]>,
-    /// One number for each output.
     outputs: Vec<f64>,
 }
 
@@ -93,7 +86,6 @@ impl PartialEq for GaussianProcess {
 }
 
 impl GaussianProcess {
-    /// The posterior of all groups.
     pub(super) fn of_groups(
         groups: &Groups,
         kernel: Kernel,
@@ -122,7 +114,6 @@ impl GaussianProcess {
         Ok(Self::assemble(data, points, variance))
     }
 
-    /// The posterior of all groups with inducing points.
     pub(super) fn of_chosen(
         groups: &Groups,
         kernel: Kernel,
@@ -180,12 +171,12 @@ impl GaussianProcess {
         Self { data, points, blocks, variance, weights, trend, covariance: None }
     }
 
-    /// Coordinates of a point, d.
+    /// Number of coordinates, d.
     pub fn coordinates(&self) -> usize {
         self.points.scaled.nrows()
     }
 
-    /// Outputs, m.
+    /// Number of outputs, m.
     pub fn outputs(&self) -> usize {
         self.weights.nrows()
     }
@@ -195,33 +186,32 @@ impl GaussianProcess {
         self.data.sparse.as_ref().map_or(self.kept(), |sparse| sparse.points)
     }
 
-    /// Number of distinct points that represent the mean, n: all, or inducing points where there are more than [`MOST_EXACT`].
+    /// Points that represent the mean, n.
     pub fn kept(&self) -> usize {
         self.points.scaled.ncols()
     }
 
-    /// Hyperparameters of the process, as fitted or given.
+    /// Fitted or given hyperparameters.
     pub fn hyperparameters(&self) -> &Hyperparameters {
         &self.data.hyperparameters
     }
 
-    /// s_j², in the square of the output's unit.
+    /// Signal variance s_j².
     pub fn signal_variance(&self, output: usize) -> f64 {
         self.data.signal_variance[output]
     }
 
-    /// The fitted noise variance η·s_j² of a single row, in the square of the output's unit; `None` where the noise of
-    /// every row was given.
+    /// Fitted noise variance η·s_j²; `None` for given noise.
     pub fn noise_variance(&self, output: usize) -> Option<f64> {
         self.data.row_noise.map(|ratio| ratio * self.data.signal_variance[output])
     }
 
-    /// The log evidence of all rows and outputs, in nats.
+    /// Log evidence, in nats.
     pub fn log_evidence(&self) -> f64 {
         self.data.log_evidence
     }
 
-    /// Buffers for predictions of this process.
+    /// Creates buffers.
     pub fn scratch(&self) -> PredictionScratch {
         let n = self.kept();
         let reduced = match &self.variance {
@@ -239,19 +229,19 @@ impl GaussianProcess {
         }
     }
 
-    /// E f_j(x) for every output.
+    /// Writes E f_j(x).
     ///
     /// # Panics
-    /// When `point` is not d long, or `means` not m.
+    /// On wrong lengths.
     pub fn mean_into(&self, point: &[f64], means: &mut [f64], scratch: &mut PredictionScratch) {
         self.place(point, scratch);
         self.means(means, scratch);
     }
 
-    /// E f_j(x) and ∂E f_j/∂x_k, m×d row by row, in the output's unit over the coordinate's.
+    /// Writes E f_j(x) and ∂E f_j/∂x_k, m×d.
     ///
     /// # Panics
-    /// When `point` is not d long, `means` not m, or `gradients` not m·d.
+    /// On wrong lengths.
     pub fn mean_and_gradient_into(
         &self,
         point: &[f64],
@@ -289,10 +279,10 @@ impl GaussianProcess {
         }
     }
 
-    /// E f_j(x) and Var f_j(x) for every output; the variance excludes the noise of a new row.
+    /// Writes E f_j(x) and Var f_j(x), without noise.
     ///
     /// # Panics
-    /// When `point` is not d long, or `means` or `variances` not m.
+    /// On wrong lengths.
     pub fn predict_into(
         &self,
         point: &[f64],
@@ -308,7 +298,7 @@ impl GaussianProcess {
         }
     }
 
-    /// Var f_j(x) over the signal's variance, from the correlations and h.
+    /// Var f_j(x)/s_j².
     fn relative_variance(&self, scratch: &mut PredictionScratch) -> f64 {
         let correlations = &scratch.correlations.as_flattened()[..self.kept()];
         match &self.variance {
@@ -326,11 +316,11 @@ impl GaussianProcess {
         }
     }
 
-    /// Writes E f_j(x) for every output and returns Var f_j(x) over the signal's variance, for tables that are computed once after a fit. Where
-    /// chosen points give the variance, it is also computed from the nearest points, and the smaller value is returned.
+    /// Writes E f_j(x) and returns Var f_j(x)/s_j², for tables: a reduced variance, or that from the nearest
+    /// points, if smaller.
     ///
     /// # Panics
-    /// When `point` is not d long, or `means` not m.
+    /// On wrong lengths.
     pub fn tabulate_into(&self, point: &[f64], means: &mut [f64], scratch: &mut PredictionScratch) -> f64 {
         self.mean_into(point, means, scratch);
         let variance = self.relative_variance(scratch);
@@ -345,7 +335,7 @@ impl GaussianProcess {
         by_nearest.map_or(variance, |near| near.min(variance))
     }
 
-    /// The nearest points, in no particular order, with their correlations.
+    /// Nearest points, unordered.
     fn nearest(correlations: &[f64]) -> (Vec<usize>, Array1<f64>) {
         const NEAREST: usize = 32;
         let mut order: Vec<usize> = (0..correlations.len()).collect();
@@ -356,7 +346,7 @@ impl GaussianProcess {
         (order, here)
     }
 
-    /// Variance over the signal's from the rows at the nearest points, never less than from all rows; `None` where their covariance has no factor.
+    /// Variance from the rows at the nearest points, an upper bound.
     fn variance_by_nearest(&self, correlations: &[f64], h: &[f64]) -> Option<f64> {
         let (nearest, here) = Self::nearest(correlations);
         let points = Points {
@@ -370,8 +360,7 @@ impl GaussianProcess {
         Some((1.0 - half.dot(&half) + rest.dot(&rest)).max(0.0))
     }
 
-    /// Variance over the signal's from the posterior values at the nearest points and the conditional variance given these values; `None`
-    /// where their covariance has no factor.
+    /// Variance from the posterior values at the nearest points, plus the conditional variance.
     fn variance_by_nearest_values(
         &self,
         covariance: &Array2<f64>,
@@ -398,17 +387,16 @@ impl GaussianProcess {
         Some(open + told.max(0.0))
     }
 
-    /// E f_j(x) and Var f_j(x), allocating.
+    /// Returns E f_j(x) and Var f_j(x).
     ///
     /// # Panics
-    /// When `point` is not d long.
+    /// On a wrong length.
     pub fn predict(&self, point: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let (mut means, mut variances) = (vec![0.0; self.outputs()], vec![0.0; self.outputs()]);
         self.predict_into(point, &mut means, &mut variances, &mut self.scratch());
         (means, variances)
     }
 
-    /// Computes u and h.
     fn place(&self, point: &[f64], scratch: &mut PredictionScratch) {
         assert_eq!(point.len(), self.coordinates(), "a point has as many coordinates as a row");
         let PosteriorData { centre, spread, hyperparameters, .. } = &self.data;
@@ -421,7 +409,6 @@ impl GaussianProcess {
         }
     }
 
-    /// Computes the correlations with the points, and the means from them and h.
     fn means(&self, means: &mut [f64], scratch: &mut PredictionScratch) {
         assert_eq!(means.len(), self.outputs(), "there is one mean an output");
         self.blocks.sums_into(&scratch.point, &mut scratch.correlations, means);
@@ -462,32 +449,30 @@ impl TryFrom<PosteriorData> for GaussianProcess {
     }
 }
 
-/// The lower triangle of a matrix of this size, row by row.
 fn packed(lower: &ArrayView2<f64>, size: usize) -> Vec<f64> {
     (0..size).flat_map(|i| (0..=i).map(move |j| (i, j))).map(|at| lower[at]).collect()
 }
 
-/// The matrix with this lower triangle, given row by row.
 fn unpacked(list: &[f64], size: usize) -> Array2<f64> {
     Array2::from_shape_fn((size, size), |(i, j)| if j <= i { list[i * (i + 1) / 2 + j] } else { 0.0 })
 }
 
-/// All data of a posterior that cannot be recomputed. Matrices are flat, row by row.
+/// Serialised data; matrices are flat, row by row.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PosteriorData {
     kernel: Kernel,
     pub trend: Trend,
-    /// Value subtracted from each coordinate.
+    /// Mean of each coordinate.
     pub centre: Vec<f64>,
-    /// Divisor of each coordinate in the trend.
+    /// Standard deviation of each coordinate.
     pub spread: Vec<f64>,
     pub hyperparameters: Hyperparameters,
     /// n×d.
     pub inputs: Vec<f64>,
-    /// Noise variance of each point over the signal's.
+    /// Noise of each point, over s².
     pub noise: Vec<f64>,
-    /// Noise variance of a single row over the signal's; `None` where the noise was given.
+    /// η; `None` for given noise.
     pub row_noise: Option<f64>,
     pub offset: Vec<f64>,
     pub scale: Vec<f64>,
@@ -497,47 +482,46 @@ struct PosteriorData {
     /// m×q.
     pub trend_coefficients: Vec<f64>,
     pub log_evidence: f64,
-    /// The data of a sparse posterior; `None` for an exact one.
+    /// `None` for an exact posterior.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sparse: Option<SparseData>,
 }
 
-/// Data of a sparse posterior about all points, beyond the chosen ones.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SparseData {
     /// Number of all points.
     points: usize,
-    /// R of the chosen points for the variance, row by row.
+    /// R, row by row.
     factor: Vec<f64>,
 }
 
-/// Error of a posterior from a file with inconsistent numbers.
+/// Error of an inconsistent file.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PosteriorFault {
     /// A list has the wrong length.
     #[error("the Gaussian process has {found} {what}; it must have {needed}")]
     Count {
-        /// Content of the list.
+        /// Name of the list.
         what: &'static str,
-        /// Length that the other lists require.
+        /// Required length.
         needed: usize,
-        /// Length of the list.
+        /// Length.
         found: usize,
     },
-    /// A number that is infinite, NaN, or out of range.
+    /// A number is out of range.
     #[error("the Gaussian process's {what} number {number} is {value}; it must be {bound}")]
     BadNumber {
-        /// Content of the list.
+        /// Name of the list.
         what: &'static str,
-        /// Index of the number, from 1.
+        /// Index, from 1.
         number: usize,
         /// Value.
         value: f64,
         /// Bound.
         bound: &'static str,
     },
-    /// The covariance has no factor.
+    /// The covariance is not positive definite.
     #[error("the Gaussian process's covariance cannot be factored: {0}")]
     Singular(#[from] NotPositiveDefinite),
     /// The variance cannot be computed.
@@ -546,7 +530,6 @@ pub enum PosteriorFault {
 }
 
 impl PosteriorData {
-    /// The data that all posteriors share; noise and evidence are set afterwards.
     fn new(
         groups: &Groups,
         (kernel, trend): (Kernel, Trend),
@@ -574,7 +557,6 @@ impl PosteriorData {
         }
     }
 
-    /// Checks lengths and ranges.
     pub fn check(&self) -> Result<(), PosteriorFault> {
         let (n, d, m) = (self.noise.len(), self.centre.len(), self.offset.len());
         let some = |what, found: usize| {

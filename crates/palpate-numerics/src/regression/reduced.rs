@@ -1,14 +1,9 @@
-//! The sparse posterior from chosen points: of the variance for more than a few hundred points, of the mean as well for more
-//! than a few thousand.
+//! Sparse posterior from inducing points u (Snelson and Ghahramani, *Sparse Gaussian Processes using
+//! Pseudo-inputs*, 2006).
 //!
-//! With u the chosen points, C_uu = L·Lᵀ and φ(x) = L⁻¹·c(u, x), the process is φ·w + h·β and a remainder of variance 1 − |φ|² that is
-//! independent from place to place: Snelson and Ghahramani's sparse process (*Sparse Gaussian Processes using Pseudo-inputs*, 2006). For rows of
-//! noise D_i this is a regression on z = (φ, h) with row variances Λ_i = D_i + 1 − |φ_i|²,
-//!
-//! A = diag(1 … 1, 1/b² …) + Σ z_i·z_iᵀ/Λ_i = R·Rᵀ, and a variance of 1 − |φ|² + |R⁻¹·z|² at a place.
-//!
-//! The points are chosen one after the other, each at the greatest variance given the chosen ones, which is a Cholesky factorisation with
-//! pivots. The selection ends when the remaining variance is a small part of the noise: the process is then that of all points except for rounding.
+//! With C_uu = L·Lᵀ and φ(x) = L⁻¹·c(u, x), the process is φ·w + h·β and an independent remainder of variance
+//! 1 − |φ|². For rows of noise D_i it is a regression on z = (φ, h) with variances Λ_i = D_i + 1 − |φ_i|²: A
+//! = diag(1 … 1, 1/b² …) + Σ z_i·z_iᵀ/Λ_i = R·Rᵀ, with the posterior variance 1 − |φ|² + |R⁻¹·z|².
 
 use super::blocks::{Triangle, cross_correlations};
 use super::covariance::{NUGGET, TREND_VARIANCE};
@@ -20,16 +15,14 @@ use ndarray::{Array1, Array2, ArrayView2, Axis, s};
 
 /// Largest number of points for the variance.
 pub(super) const OF_VARIANCE: usize = 256;
-/// Largest number of points for the mean of a sparse process.
+/// Largest number of inducing points.
 pub const INDUCING: usize = 1000;
-/// Number of candidates for the chosen points.
 const CANDIDATES: usize = 4000;
-/// Share of the noise below which a remaining variance is negligible.
+/// Negligible variance, as a share of the noise.
 const SMALL: f64 = 0.02;
-/// Number of rows in one product.
 const ROWS: usize = 512;
 
-/// Indices of the chosen points, each at the greatest variance given the previous ones.
+/// Greedy selection by pivoted Cholesky factorisation.
 pub(super) fn chosen(kernel: Kernel, scaled: &ArrayView2<f64>, ratio: f64, most: usize) -> Vec<usize> {
     let n = scaled.ncols();
     let mut candidates = random_order(n, 0);
@@ -63,10 +56,8 @@ pub(super) fn chosen(kernel: Kernel, scaled: &ArrayView2<f64>, ratio: f64, most:
     chosen
 }
 
-/// Variance of the process from some of its points.
 #[derive(Clone, Debug)]
 pub(super) struct Reduced {
-    /// Indices of the points.
     chosen: Vec<usize>,
     /// L⁻¹.
     whiten: Triangle,
@@ -74,7 +65,6 @@ pub(super) struct Reduced {
     shrink: Triangle,
 }
 
-/// Buffers for one variance.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ReducedScratch {
     correlations: Vec<f64>,
@@ -83,7 +73,6 @@ pub(super) struct ReducedScratch {
 }
 
 impl Reduced {
-    /// The variance from chosen points and the lower triangle of R.
     pub fn new(
         kernel: Kernel,
         scaled: &ArrayView2<f64>,
@@ -98,7 +87,7 @@ impl Reduced {
         })
     }
 
-    /// Buffers for this variance.
+    /// Creates buffers.
     pub fn scratch(&self) -> ReducedScratch {
         let size = self.chosen.len();
         ReducedScratch {
@@ -108,7 +97,7 @@ impl Reduced {
         }
     }
 
-    /// Variance at a place over the signal's, from the correlations of the place with all points and the trend's basis h.
+    /// Var/s², from the correlations with all points and h.
     pub fn variance(&self, all: &[f64], h: &[f64], scratch: &mut ReducedScratch) -> f64 {
         let ReducedScratch { correlations, basis, product } = scratch;
         correlations.iter_mut().zip(&self.chosen).for_each(|(c, point)| *c = all[*point]);
@@ -127,7 +116,6 @@ fn factor_of(kernel: Kernel, points: &ArrayView2<f64>) -> Result<Cholesky, NotPo
     Cholesky::factor(correlations)
 }
 
-/// Rows of a sparse process.
 #[derive(Clone, Copy)]
 pub(super) struct Rows<'a> {
     /// u, d×n.
@@ -136,26 +124,24 @@ pub(super) struct Rows<'a> {
     pub basis: ArrayView2<'a, f64>,
     /// ȳ, n×m.
     pub means: ArrayView2<'a, f64>,
-    /// D, over the signal's variance.
+    /// D, over s².
     pub noise: &'a [f64],
 }
 
-/// Result of the regression for a sparse process.
 pub(super) struct Learnt {
-    /// α of the chosen points, k×m, and β, q×m.
+    /// α, k×m; β, q×m.
     pub weights: Array2<f64>,
     pub trend: Array2<f64>,
-    /// ȳᵀ·(Q + Λ)⁻¹·ȳ of every output.
+    /// ȳᵀ·(Q + Λ)⁻¹·ȳ by output.
     pub quadratics: Vec<f64>,
     /// ln det(Q + Λ).
     pub log_determinant: f64,
     /// R of the first [`OF_VARIANCE`] points.
     pub variance: Cholesky,
-    /// Covariance of the process at the chosen points and of β over the signal's variance, (k+q)².
+    /// Posterior covariance at the chosen points and of β, over s².
     pub covariance: Array2<f64>,
 }
 
-/// Regression on the functions of the chosen points, in the order of decreasing variance.
 pub(super) fn learn(
     kernel: Kernel,
     rows: Rows,
@@ -219,7 +205,7 @@ pub(super) fn learn(
     })
 }
 
-/// Sums over the rows: A, and Σ z_i·ȳ_iᵀ/Λ_i.
+/// A, and Σ z_i·ȳ_iᵀ/Λ_i.
 struct Sums {
     precision: Array2<f64>,
     scores: Array2<f64>,
@@ -232,7 +218,7 @@ impl Sums {
         Self { precision: Array2::from_diag(&diagonal), scores: Array2::zeros((functions + terms, outputs)) }
     }
 
-    /// Adds rows: φ, k×r, h, r×q, ȳ, r×m, and Λ.
+    /// Adds r rows: φ, k×r, h, r×q, ȳ, r×m, and Λ.
     fn add(
         &mut self,
         functions: &ArrayView2<f64>,

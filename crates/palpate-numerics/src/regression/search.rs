@@ -1,4 +1,4 @@
-//! Fit of the hyperparameters: the maximum of the evidence with a weak prior.
+//! Fit of the hyperparameters.
 
 use ndarray::Axis;
 
@@ -9,19 +9,17 @@ use super::{GaussianProcess, Hyperparameters, Kernel, RegressionError, Samples, 
 use crate::random_order;
 use crate::watch::{Cancelled, Watch};
 
-/// Settings of a Gaussian process fit.
+/// Settings of a fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Regression {
-    /// The correlation of two points.
+    /// Covariance function.
     pub kernel: Kernel,
-    /// Basis of the mean.
+    /// Mean function.
     pub trend: Trend,
-    /// Largest number of distinct points, drawn at random, in the fit of the hyperparameters; at least 2. For any
-    /// number of them the posterior is that of all rows: exactly up to [`MOST_EXACT`](super::MOST_EXACT) points, beyond that with a
-    /// thousand inducing points.
+    /// Points in the search, at least 2; the posterior uses all.
     pub search_points: usize,
-    /// Seed of the draw.
+    /// Seed of their choice.
     pub seed: u64,
 }
 
@@ -31,33 +29,30 @@ impl Default for Regression {
     }
 }
 
-/// Number of points in the trials of the starts.
 const TRIAL_POINTS: usize = 160;
-/// Stopping criteria of the trial of a start, and of the search that continues from the best.
+/// Criteria for a start, and for the best one.
 const TRIAL: Stop = Stop { evaluations: 30, decrease: 0.05 };
 const FINAL: Stop = Stop { evaluations: 60, decrease: 0.01 };
-/// Starts: length scales over the coordinates' spread, and the noise ratio.
+/// Relative length scales, and noise ratio.
 const STARTS: [(f64, f64); 3] = [(1.0, 1e-2), (0.3, 1e-3), (3.0, 1e-5)];
 
 impl Regression {
-    /// Fits the hyperparameters and computes the posterior.
+    /// Fits hyperparameters and computes the posterior.
     ///
-    /// All outputs share length scales and noise ratio; each has its own signal variance. The logarithms of the
-    /// hyperparameters have wide normal priors: one standard deviation is a factor of e² for length scales, and e⁵ for a fitted
-    /// noise ratio. The priors matter only where a handful of rows contain no information.
+    /// The logarithms have normal priors: standard deviation 2 for length scales, 5 for a fitted noise ratio.
     ///
     /// # Errors
-    /// [`RegressionError`], with the invalid row or value; or when `watch` stopped the fit.
+    /// [`RegressionError`].
     pub fn fit(&self, samples: Samples, watch: Watch) -> Result<GaussianProcess, RegressionError> {
         let groups = Groups::new(samples)?;
         let found = self.search(&groups, watch)?;
         GaussianProcess::of_groups(&groups, self.kernel, self.trend, &found, watch)
     }
 
-    /// Fits the hyperparameters only, as [`Self::fit`] does.
+    /// Fits only the hyperparameters.
     ///
     /// # Errors
-    /// [`RegressionError`], with the invalid row or value; or when `watch` stopped the fit.
+    /// As [`Self::fit`].
     pub fn hyperparameters(
         &self,
         samples: Samples,
@@ -66,10 +61,10 @@ impl Regression {
         Ok(self.search(&Groups::new(samples)?, watch)?)
     }
 
-    /// Fits as [`Self::fit`] does, but each output with its own hyperparameters: one process for each output.
+    /// Fits one process per output.
     ///
     /// # Errors
-    /// [`RegressionError`], with the invalid row or value.
+    /// As [`Self::fit`].
     pub fn fit_each(&self, samples: Samples, watch: Watch) -> Result<Vec<GaussianProcess>, RegressionError> {
         let mut processes = Vec::with_capacity(samples.outputs.ncols());
         for column in samples.outputs.axis_chunks_iter(Axis(1), 1) {
@@ -78,10 +73,10 @@ impl Regression {
         Ok(processes)
     }
 
-    /// The posterior with given hyperparameters.
+    /// Computes the posterior for given hyperparameters.
     ///
     /// # Errors
-    /// [`RegressionError`], with the invalid row or value; or when `watch` stopped the work.
+    /// As [`Self::fit`].
     pub fn condition(
         &self,
         samples: Samples,
@@ -114,7 +109,7 @@ impl Regression {
         Ok(Hyperparameters::from_logarithms(&best.0))
     }
 
-    /// Logarithms of the hyperparameters at the maximum of the posterior density from `start`, and minus the logarithm of the density.
+    /// Optimum, and minus its log density.
     fn follow(
         &self,
         groups: &Groups,
@@ -139,11 +134,10 @@ impl Regression {
     }
 }
 
-/// Normal priors of the logarithms of the hyperparameters.
 struct Prior {
     centre: Vec<f64>,
     deviation: Vec<f64>,
-    /// ln η for a signal as large as the outputs, where the noise is given: the start of every search.
+    /// ln η for s² equal to the mean square.
     known_start: Option<f64>,
 }
 
@@ -159,7 +153,6 @@ impl Prior {
         Self { centre, deviation: [vec![2.0; d], vec![deviation]].concat(), known_start }
     }
 
-    /// Start of a search, from length scales over their centre and a noise ratio.
     fn start(&self, (scale, noise): (f64, f64)) -> Vec<f64> {
         let mut start: Vec<f64> = self.centre.iter().map(|centre| centre + f64::ln(scale)).collect();
         if let Some(last) = start.last_mut() {
@@ -168,7 +161,7 @@ impl Prior {
         start
     }
 
-    /// ½·Σ ((θ − centre)/deviation)², and its gradient added.
+    /// ½·Σ ((θ − centre)/deviation)²; adds its gradient.
     fn minus_log_density(&self, logarithms: &[f64], gradient: &mut [f64]) -> f64 {
         let mut sum = 0.0;
         for (i, theta) in logarithms.iter().enumerate() {

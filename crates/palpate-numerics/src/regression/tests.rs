@@ -41,7 +41,7 @@ fn logarithms(h: &Hyperparameters) -> Vec<f64> {
     h.length_scales.iter().chain([&h.noise_ratio]).map(|value| value.ln()).collect()
 }
 
-/// Evidence and prediction at `at`, from all original rows by the textbook formulas, without collapsing or lemmas.
+/// Evidence and prediction from all original rows, by the textbook formulas.
 struct Dense {
     log_evidence: f64,
     mean: Vec<f64>,
@@ -200,7 +200,7 @@ fn far_away_it_knows_what_it_knew_before() {
     let process = fit(Regression::default(), samples(&x, &y, None));
     let (mean, variance) = process.predict(&[1e4, -1e4]);
     for j in 0..2 {
-        // The constant trend is not known exactly either.
+        // The constant trend has an error too.
         let more = variance[j] / process.signal_variance(j);
         assert!((1.0..2.0).contains(&more), "{more}");
         let values = y.column(j);
@@ -242,7 +242,7 @@ fn a_sampled_functions_hyperparameters_are_recovered() {
 
 #[test]
 fn repeats_alone_tell_the_noise() {
-    // Eight places, far too few to distinguish a wiggle from noise without the repeats.
+    // Eight places, too few to distinguish the function from noise without repeats.
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
     let x = Array2::from_shape_fn((160, 1), |(r, _)| (r % 8) as f64);
     let y = Array2::from_shape_fn((160, 1), |(r, _)| {
@@ -336,7 +336,7 @@ fn it_comes_back_from_a_file_and_a_damaged_file_is_refused() {
     }
 }
 
-/// Eight bell-shaped features of a position with noise, and the position: the input of a regression of positions.
+/// Eight bell-shaped features of a position with noise, and the position.
 fn features(rows: usize, seed: u64) -> (Array2<f64>, Array2<f64>) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let y = Array2::from_shape_fn((rows, 1), |_| rng.random_range(0.0..1.0));
@@ -347,7 +347,8 @@ fn features(rows: usize, seed: u64) -> (Array2<f64>, Array2<f64>) {
     (x, y)
 }
 
-/// Largest difference of two processes' means and standard deviations of a new row, over the deviations of the first.
+/// Largest differences of two processes' means and standard deviations of a new row, over the deviations of
+/// the first.
 fn difference(exact: &GaussianProcess, other: &GaussianProcess, at: &Array2<f64>) -> [f64; 2] {
     let mut worst = [0.0_f64; 2];
     for at in at.outer_iter() {
@@ -417,7 +418,7 @@ fn chosen_points_tell_what_all_do() {
 
 #[test]
 fn tables_of_a_rough_process_are_as_sure_as_all_rows_make_them() {
-    // Too rough for the few points that give the variance of a prediction.
+    // Too rough for the few points of the reduced variance.
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(13);
     let x = Array2::<f64>::from_shape_fn((2500, 2), |_| rng.random_range(0.0..1.0));
     let y = Array2::from_shape_fn((2500, 1), |(i, _)| (9.0 * x[[i, 0]]).sin() * (7.0 * x[[i, 1]]).cos());

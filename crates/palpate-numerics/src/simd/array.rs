@@ -1,13 +1,13 @@
-//! Vectors as arrays: for every machine, and as the reference of the vectors made of instructions.
+//! Portable vectors, and reference of the vectors made of instructions.
 
 use super::{Arithmetic, Eight, Number, Real, Vector};
 use std::ops::{Add, Div, Mul, Sub};
 
-/// N numbers in an array. With `FUSED` a multiply-add rounds once, which is fast only on machines with the instruction.
+/// N numbers. With `FUSED` a multiply-add rounds once.
 #[derive(Clone, Copy, Debug)]
 pub struct Array<R, const N: usize, const FUSED: bool>([R; N]);
 
-/// The compiler may not inline calls to `std::array::from_fn`; a loop over a filled array needs no calls.
+/// `std::array::from_fn` may not be inlined; this loop has no calls.
 macro_rules! each_lane {
     ($any:expr, $lane:ident => $value:expr) => {{
         let mut lanes = $any.0;

@@ -1,7 +1,4 @@
-//! Several numbers at a time: the instruction sets of the machine, and vectors of eight f64 and sixteen f32 in each.
-//!
-//! Work is written once, as a [`Kernel`] over the vectors of an instruction set ([`Simd`]). [`InstructionSet::run`] compiles it
-//! for every set and calls the version for the chosen one:
+//! Vectors for the instruction sets of a machine. [`InstructionSet::run`] compiles a [`Kernel`] for each:
 //!
 //! ```
 //! use palpate_numerics::simd::{Arithmetic, InstructionSet, Kernel, Simd, Vector};
@@ -26,12 +23,7 @@
 //! assert_eq!(y, [[7.0; 8]]);
 //! ```
 //!
-//! Every operation rounds according to IEEE 754, lane by lane, and sums over lanes have one order. So a kernel gives the same bits with every set
-//! of a machine: a multiply-add rounds once on a machine that can fuse it, also in the portable set.
-//!
-//! On x86 vectors are instructions, not arrays that the compiler may vectorise: with arrays under `#[target_feature]` training on a Xeon
-//! runs at 0.6 (f64) and 0.3 (f32) of its rate with AVX-512 and at 0.8 to 0.9 with AVX2, batches through a network at 0.07 and 0.46, and the
-//! influence estimator at 0.7. Where arrays are as fast, [`run_loops`] compiles loops over them for AVX2.
+//! All sets give equal bits: operations round by IEEE 754, and sums have one order.
 #![allow(unsafe_code, reason = "instructions that the machine was asked for")]
 
 mod array;
@@ -46,9 +38,9 @@ pub use vector::{Abreast, Arithmetic, Eight, LOOK_UP, Number, Real, Vector};
 pub trait Kernel {
     /// Result of the work.
     type Output;
-    /// True for a kernel with [`Vector::mul_add`] or [`Vector::mul_sub`]. Other kernels need one compilation less.
+    /// True with [`Vector::mul_add`] or [`Vector::mul_sub`].
     const FUSED: bool;
-    /// Does the work with the vectors of `S`. It must be `#[inline(always)]`, and so must its time-critical functions.
+    /// Runs it. This function and time-critical callees must be `#[inline(always)]`.
     fn run<S: Simd>(self) -> Self::Output;
 }
 
@@ -58,9 +50,9 @@ pub trait Simd {
     type F64: Eight;
     /// Sixteen f32.
     type F32: Vector<16, Real = f32>;
-    /// N numbers in an array, with the multiplication and addition of the vectors.
+    /// N numbers.
     type Array<R: Real, const N: usize>: Vector<N, Real = R>;
-    /// Number of vectors that fit into the registers.
+    /// Vectors that fit into the registers.
     const REGISTERS: usize;
 }
 
@@ -78,10 +70,10 @@ enum Set {
 }
 
 impl InstructionSet {
-    /// Arrays, available on every machine.
+    /// Arrays, for every machine.
     pub const PORTABLE: Self = Self(Set::Portable);
 
-    /// The widest set of this machine.
+    /// Returns the widest set of this machine.
     #[inline]
     pub fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
@@ -96,7 +88,7 @@ impl InstructionSet {
         Self::PORTABLE
     }
 
-    /// Instruction sets of this machine, widest first.
+    /// Returns the sets of this machine, widest first.
     pub fn available() -> Vec<Self> {
         #[cfg(target_arch = "x86_64")]
         let wide = [(has_avx512(), Set::Avx512), (has_avx2(), Set::Avx2)];
@@ -106,7 +98,7 @@ impl InstructionSet {
         wide.chain([Self::PORTABLE]).collect()
     }
 
-    /// Does the work of `kernel` with this set.
+    /// Runs a kernel.
     #[inline(always)]
     pub fn run<K: Kernel>(self, kernel: K) -> K::Output {
         match self.0 {
@@ -134,7 +126,7 @@ impl std::fmt::Display for InstructionSet {
     }
 }
 
-/// Does the work of a kernel with loops over arrays that the compiler vectorises: AVX2 and FMA where the machine has them.
+/// Runs a kernel with arrays, for AVX2 and FMA where available.
 #[inline(always)]
 pub fn run_loops<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
@@ -145,7 +137,7 @@ pub fn run_loops<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Portable<NATIVE_FMA>>()
 }
 
-/// True when every machine of this architecture fuses multiplications and additions.
+/// True for architectures with fused multiply-add.
 const NATIVE_FMA: bool = cfg!(target_arch = "aarch64");
 
 #[cfg(target_arch = "x86_64")]
@@ -178,7 +170,7 @@ unsafe fn compiled_for_avx2<K: Kernel, S: Simd>(kernel: K) -> K::Output {
     kernel.run::<S>()
 }
 
-/// One register for each vector.
+/// One register per vector.
 #[cfg(target_arch = "x86_64")]
 struct Avx512;
 
@@ -190,7 +182,7 @@ impl Simd for Avx512 {
     const REGISTERS: usize = 32;
 }
 
-/// Two registers for each vector: two interleaved halves hide the latency of one.
+/// Two registers per vector, to hide latency.
 #[cfg(target_arch = "x86_64")]
 struct Avx2;
 
@@ -202,7 +194,6 @@ impl Simd for Avx2 {
     const REGISTERS: usize = 8;
 }
 
-/// Arrays. With `FUSED` a multiply-add rounds once, which is fast only on machines with the instruction.
 struct Portable<const FUSED: bool>;
 
 impl<const FUSED: bool> Simd for Portable<FUSED> {

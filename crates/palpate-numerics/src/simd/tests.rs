@@ -1,14 +1,13 @@
-//! Every vector gives the results of arrays, and every lane of an array those of a number.
+//! Vectors agree with arrays, and lanes with numbers.
 
 use super::*;
 use std::fmt::Debug;
 
-/// Numbers of both signs and of many sizes.
+/// Numbers of both signs and many sizes.
 fn numbers<const N: usize>(shift: usize) -> [f64; N] {
     std::array::from_fn(|i| ((i * 7 + shift * 3) as f64 * 1.3).sin() * 10f64.powi((i + shift) as i32 % 5))
 }
 
-/// Results of every operation of a vector, lane by lane.
 #[inline(always)]
 fn vector_operations<V: Vector<N>, const N: usize>(shift: usize) -> Vec<[V::Real; N]> {
     let row = |shift: usize| numbers::<N>(shift).map(V::Real::from_f64);
@@ -38,7 +37,6 @@ fn vector_operations<V: Vector<N>, const N: usize>(shift: usize) -> Vec<[V::Real
     results.into_iter().chain(V::transpose(&rows)).map(V::to_array).collect()
 }
 
-/// Results of the further operations of eight f64.
 #[inline(always)]
 fn eight_operations<V: Eight>(shift: usize) -> (Vec<[f64; 8]>, Vec<u8>, f64) {
     let [a, b] = [shift, shift + 1].map(|shift| V::load(&numbers(shift)));
@@ -58,7 +56,6 @@ fn eight_operations<V: Eight>(shift: usize) -> (Vec<[f64; 8]>, Vec<u8>, f64) {
     (vectors.to_vec(), bits.to_vec(), a.sum())
 }
 
-/// All operations of one instruction set.
 struct Operations;
 
 impl Kernel for Operations {

@@ -1,8 +1,8 @@
-//! Operations on numbers side by side. Every operation acts lane by lane and rounds according to IEEE 754.
+//! Operations by lane, rounded by IEEE 754.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// The number in one lane: f64 or f32.
+/// A lane: f64 or f32.
 pub trait Real:
     Copy
     + PartialOrd
@@ -13,21 +13,21 @@ pub trait Real:
     + Neg<Output = Self>
     + 'static
 {
-    /// Adding then subtracting it rounds to a whole number n; the sum's low bits are then the exponent of 2ⁿ: 1.5·2^mantissa + bias.
+    /// 1.5·2^mantissa + bias: added, it rounds to n, with the exponent of 2ⁿ in the low bits.
     const ROUNDER: Self;
-    /// Coefficients of the minimax polynomial of 2^r on |r| ≤ ½ (Remez, relative error), lowest first.
+    /// Minimax polynomial of 2^r, |r| ≤ ½ (Remez), ascending.
     const EXP2: &'static [Self];
-    /// The product of two exponentials of numbers up to this is finite.
+    /// Half of the largest argument of an exponential.
     const HALF_OF_EXP: Self;
-    /// Rounds to the precision of this type.
+    /// Rounds to this type.
     fn from_f64(x: f64) -> Self;
-    /// Converts to f64 without rounding.
+    /// Converts exactly.
     fn to_f64(self) -> f64;
     /// `self` · `factor` + `term`, rounded once.
     fn fused_mul_add(self, factor: Self, term: Self) -> Self;
-    /// The square root.
+    /// Square root.
     fn square_root(self) -> Self;
-    /// 2ⁿ of `self` = n + [`Real::ROUNDER`], where that is a normal number.
+    /// 2ⁿ of `self` = n + [`Real::ROUNDER`], if normal.
     fn power_of_two(self) -> Self;
 }
 
@@ -85,50 +85,49 @@ real!(f32, ROUNDER: 12_583_039.0, HALF_OF_EXP: 43.0, EXP2: [
     0.001_327_647_2
 ]);
 
-/// A number, or several side by side.
+/// A number, or several.
 pub trait Arithmetic:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
-    /// The number in one lane.
+    /// Type of a lane.
     type Real: Real;
-    /// This number in every lane.
+    /// Returns `value` in every lane.
     fn splat(value: Self::Real) -> Self;
-    /// The larger; `other` where they cannot be compared.
+    /// Maximum; `other` if unordered.
     fn max(self, other: Self) -> Self;
-    /// The smaller; `other` where they cannot be compared.
+    /// Minimum; `other` if unordered.
     fn min(self, other: Self) -> Self;
 }
 
-/// An f64, or up to eight side by side, with a bit for each lane. Code for this trait gives the same bits for one and for eight.
+/// One f64 or eight, with results of equal bits.
 pub trait Number: Arithmetic<Real = f64> {
-    /// The integer part, without the digits after the point.
+    /// Integer part.
     fn truncate(self) -> Self;
-    /// Bit i is set where lane i is at most that of `other`.
+    /// Bit i: lane i is at most that of `other`.
     fn at_most(self, other: Self) -> u8;
-    /// `self` where the lane's bit is set, `other` where it is not.
+    /// `self` for set bits, otherwise `other`.
     fn or(self, bits: u8, other: Self) -> Self;
 }
 
-/// Length of the table of [`Vector::look_up`]: as many numbers as two AVX-512 registers of f32 contain.
+/// Length of a look-up table: two AVX-512 registers of f32.
 pub const LOOK_UP: usize = 32;
 
-/// N numbers side by side.
+/// N numbers.
 pub trait Vector<const N: usize>: Arithmetic {
-    /// The numbers of an array, lane by lane.
+    /// Loads the lanes.
     fn load(values: &[Self::Real; N]) -> Self;
-    /// The lanes.
+    /// Stores the lanes.
     fn to_array(self) -> [Self::Real; N];
-    /// `self` · `factor` + `term`, rounded once where the machine can.
+    /// `self` · `factor` + `term`, fused where possible.
     fn mul_add(self, factor: Self, term: Self) -> Self;
-    /// `self` · `factor` − `term`, rounded once where the machine can.
+    /// `self` · `factor` − `term`, fused where possible.
     fn mul_sub(self, factor: Self, term: Self) -> Self;
-    /// The square root.
+    /// Square root.
     fn square_root(self) -> Self;
-    /// 2ⁿ of `self` = n + [`Real::ROUNDER`], where that is a normal number.
+    /// 2ⁿ of `self` = n + [`Real::ROUNDER`], if normal.
     fn power_of_two(self) -> Self;
 
-    /// eᶻ, by 2^x = 2^n · 2^r with n the whole number next to x and a polynomial in r. Where it would be infinite or subnormal, z is first
-    /// clamped to plus or minus twice [`Real::HALF_OF_EXP`].
+    /// eᶻ = 2^n · 2^r; z is clamped to ± twice [`Real::HALF_OF_EXP`].
     #[inline(always)]
     fn exponential(self) -> Self {
         let number = |x: f64| Self::splat(Self::Real::from_f64(x));
@@ -145,7 +144,7 @@ pub trait Vector<const N: usize>: Arithmetic {
         power * shifted.power_of_two()
     }
 
-    /// For each lane, the number at the index in its pick; only the low bits of the pick count.
+    /// Looks up indices, by low bits.
     #[inline(always)]
     fn look_up(numbers: &[Self::Real; LOOK_UP], picks: &[u32; N]) -> Self {
         let mut lanes = [numbers[0]; N];
@@ -155,7 +154,7 @@ pub trait Vector<const N: usize>: Arithmetic {
         Self::load(&lanes)
     }
 
-    /// The columns of N rows of eight numbers.
+    /// Columns of N rows.
     #[inline(always)]
     fn transpose(rows: &[[Self::Real; 8]; N]) -> [Self; 8] {
         let mut columns = [Self::splat(rows[0][0]); 8];
@@ -170,18 +169,18 @@ pub trait Vector<const N: usize>: Arithmetic {
     }
 }
 
-/// Eight f64 side by side.
+/// Eight f64.
 pub trait Eight: Number + Vector<8> {
-    /// Bit i is set where lane i is below that of `other`.
+    /// Bit i: lane i is below that of `other`.
     fn below(self, other: Self) -> u8;
 
-    /// `value` where the lane of `self` is below that of `bound`, `other` elsewhere.
+    /// `value` where `self` is below `bound`, otherwise `other`.
     #[inline(always)]
     fn where_below(self, bound: Self, value: Self, other: Self) -> Self {
         value.or(self.below(bound), other)
     }
 
-    /// ((0 + 4) + (2 + 6)) + ((1 + 5) + (3 + 7)), by lane.
+    /// Sum in a fixed order.
     #[inline(always)]
     fn sum(self) -> f64 {
         let a = self.to_array();
@@ -230,21 +229,20 @@ impl Number for f64 {
     }
 }
 
-/// One number for each of the rows in a joint computation, one row or eight, with `V` as the type of a row's vectors. Code for this trait
-/// gives the same bits for one row and for eight.
+/// One number per row, for one row or eight with equal bits; `V` is a row's vector.
 pub trait Abreast<V: Copy>: Number {
     /// Number of rows.
     const COUNT: usize;
-    /// The bits of all rows.
+    /// Bits of all rows.
     const ALL: u8 = (u8::MAX as u32 >> (8 - Self::COUNT)) as u8;
-    /// A value of each row.
+    /// One value per row.
     type Each<T: Copy>: AsRef<[T]> + AsMut<[T]>;
 
-    /// `value` for each row.
+    /// Returns `value` for each row.
     fn each<T: Copy>(value: T) -> Self::Each<T>;
-    /// The numbers.
+    /// Returns the numbers.
     fn lanes(self) -> Self::Each<f64>;
-    /// The numbers side by side.
+    /// Creates lanes from numbers.
     fn from_lanes(lanes: &Self::Each<f64>) -> Self;
     /// [`Eight::sum`] of each row's K vectors.
     fn sums<const K: usize>(vectors: &Self::Each<[V; K]>) -> [Self; K];

@@ -13,7 +13,7 @@ use std::arch::x86_64::*;
 use std::mem::transmute;
 use std::ops::{Add, Div, Mul, Sub};
 
-/// A vector from the value `$value` for each register `$r`.
+/// Vector from `$value` for each register `$r`.
 macro_rules! each_register {
     ($any:expr, $r:ident => $value:expr) => {{
         let mut registers = $any.0;
@@ -106,7 +106,7 @@ macro_rules! vector {
     };
 }
 
-/// Transposes squares of 4 × 4 numbers, as many side by side as a register has quarters.
+/// Transposes squares of 4 × 4 numbers.
 macro_rules! transpose {
     ($quarters:literal quarters: $low:ident, $high:ident, $shuffle:ident) => {
         #[inline(always)]
@@ -144,7 +144,7 @@ vector! {
     _mm512_fmadd_pd, _mm512_fmsub_pd, _mm512_sqrt_pd,
     power_of_two: n => _mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(n))),
 
-    /// The numbers lie in four registers, which two permutes and a blend search faster than a gather.
+    /// Faster than a gather.
     #[inline(always)]
     fn look_up(numbers: &[f64; LOOK_UP], picks: &[u32; 8]) -> Self {
         // SAFETY: see the head of this file; all of these are arrays of numbers of the same size, and any bits are a number.
@@ -165,7 +165,7 @@ vector! {
     _mm512_fmadd_ps, _mm512_fmsub_ps, _mm512_sqrt_ps,
     power_of_two: n => _mm512_castsi512_ps(_mm512_slli_epi32::<23>(_mm512_castps_si512(n))),
 
-    /// The numbers lie in two registers, which one permute searches faster than a gather.
+    /// Faster than a gather.
     #[inline(always)]
     fn look_up(numbers: &[f32; LOOK_UP], picks: &[u32; 16]) -> Self {
         // SAFETY: see the head of this file; all of these are arrays of numbers of the same size, and any bits are a number.
@@ -260,7 +260,6 @@ unsafe fn sum_of_four(four: __m256d) -> f64 {
 }
 
 impl Avx2F64 {
-    /// The lanes' signs.
     #[inline(always)]
     fn signs(self) -> u8 {
         let [low, high] = self.0;

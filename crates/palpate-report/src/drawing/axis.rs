@@ -1,32 +1,32 @@
-//! An axis: its range, the positions of values along it, and its round numbers with their labels.
+//! Axis of a chart: range, scale and labelled ticks.
 
 use super::geometry::Rect;
 use super::svg::{Anchor, Label, QUIET_INK};
 use super::text;
 
-/// One axis of a chart.
+/// An axis of a chart.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Axis {
-    /// Quantity along the axis, with its unit: "load position, mm".
+    /// Quantity with its unit: "load position, mm".
     pub label: String,
-    /// First and last value shown, in either order. For `None`, the range follows from the data and marks, with padding. This also applies
-    /// to equal ends, and to ends that the scale cannot show (not finite, or not positive on a logarithmic axis). A linear axis
-    /// then ends on round numbers and is not padded across zero.
+    /// First and last value, in either order. `None`, equal ends, or ends that the scale cannot
+    /// show: the range of the data and marks, padded. A linear axis then ends on round numbers and
+    /// is not padded across zero.
     pub range: Option<(f64, f64)>,
     /// Mapping of values to lengths.
     pub scale: Scale,
-    /// Values with a labelled tick, each with its label, as far as they are in the range; a label that would touch its neighbour's is
-    /// left out. `None`: round numbers, as many as are readable.
+    /// Labelled values; a label without room is omitted. `None`: as many round numbers as are
+    /// readable.
     pub ticks: Option<Vec<(f64, String)>>,
 }
 
 impl Axis {
-    /// A linear axis with automatic range and ticks.
+    /// Returns a linear axis with automatic range and ticks.
     pub fn linear(label: impl Into<String>) -> Self {
         Axis { label: label.into(), ..Axis::default() }
     }
 
-    /// A logarithmic axis with automatic range and ticks.
+    /// Returns a logarithmic axis with automatic range and ticks.
     pub fn log10(label: impl Into<String>) -> Self {
         Axis { label: label.into(), scale: Scale::Log10, ..Axis::default() }
     }
@@ -57,14 +57,13 @@ pub enum Scale {
     Log10,
 }
 
-/// Largest magnitude that is drawn; beyond it a range could overflow.
+/// Largest drawn magnitude; a larger range could overflow.
 const LARGEST: f64 = 1e300;
-/// Smallest value drawn on a logarithmic axis.
 const SMALLEST: f64 = 1e-300;
-/// Share of the range that an automatic axis leaves free at each end.
+/// Free share of the range at each end of an automatic axis.
 const PADDING: f64 = 0.04;
 
-/// An axis with definite ends: `low` < `high`, and both positive on a logarithmic axis.
+/// Range of an axis: `low` < `high`, both positive on a logarithmic axis.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct AxisScale {
     pub low: f64,
@@ -73,19 +72,18 @@ pub(crate) struct AxisScale {
 }
 
 impl AxisScale {
-    /// The ends of the axis's own range, or those that `values` need.
     pub fn new(axis: &Axis, values: &[f64]) -> Self {
         let (low, high) = fixed_ends(axis).unwrap_or_else(|| automatic_ends(axis.scale, values));
         AxisScale { low, high, scale: axis.scale }
     }
 
-    /// Position of a value of the data: 0 at the low end, 1 at the high end, and beyond them for values outside (limited to
-    /// ±1e6). `None` for a value that the scale cannot show.
+    /// Position of a data value: 0 at the low end, 1 at the high end, limited to ±1e6. `None` for a
+    /// value that the scale cannot show.
     pub fn share(&self, value: f64) -> Option<f64> {
         drawable(self.scale, value).then(|| self.tick_share(value))
     }
 
-    /// Position as of [`AxisScale::share`], for a value on the axis itself; its rounded ends may exceed the bounds of data.
+    /// [`AxisScale::share`] of a value on the axis; rounded ends may exceed the bounds of data.
     pub fn tick_share(&self, value: f64) -> f64 {
         let share = match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
@@ -94,7 +92,7 @@ impl AxisScale {
         share.clamp(-1e6, 1e6)
     }
 
-    /// Position as of [`AxisScale::share`], but a finite value that is not positive lies on the low end of a logarithmic axis.
+    /// [`AxisScale::share`], but non-positive values lie on the low end of a logarithmic axis.
     pub fn share_or_low_end(&self, value: f64) -> Option<f64> {
         match self.scale {
             Scale::Log10 if value <= 0.0 && value.is_finite() => Some(0.0),
@@ -117,7 +115,6 @@ fn fixed_ends(axis: &Axis) -> Option<(f64, f64)> {
     usable.then_some((low, high))
 }
 
-/// Whether neighbouring ticks between the two could not be distinguished.
 fn too_narrow(low: f64, high: f64) -> bool {
     high - low <= 1e-9 * low.abs().max(high.abs()) || high - low < SMALLEST
 }
@@ -154,7 +151,7 @@ fn log_ends(low: f64, high: f64) -> (f64, f64) {
     ((low / factor).max(SMALLEST), (high * factor).min(LARGEST))
 }
 
-/// The smallest of 1, 2 or 5 times a power of ten that is at least `least` (which is positive).
+/// Smallest of 1, 2 or 5 times a power of ten that is at least `least` > 0.
 fn round_step_above(least: f64) -> f64 {
     let decade = 10_f64.powi(least.log10().floor() as i32);
     [1.0, 2.0, 5.0]
@@ -164,29 +161,29 @@ fn round_step_above(least: f64) -> f64 {
         .unwrap_or(10.0 * decade)
 }
 
-/// Greatest number of ticks on one axis.
+/// Greatest number of ticks.
 const MOST: usize = 11;
-/// Multiples of a power of ten, from fine to coarse, for a logarithmic axis of few decades.
+/// Multiples of a power of ten, from fine to coarse, for few decades.
 const LOG_MULTIPLES: [&[f64]; 3] = [&[1.0, 2.0, 5.0], &[1.0, 3.0], &[1.0]];
 
 pub(crate) const TICK_SIZE: f64 = 11.5;
 /// Distance from the plot to the labels of the vertical axis.
 pub(crate) const TICK_GAP: f64 = 8.0;
-/// Distance from the plot down to the middle of the labels of the horizontal axis.
+/// Distance from the plot to the middle of the labels of the horizontal axis.
 const TICK_DROP: f64 = 16.0;
 /// Least distances between neighbouring labels, and between their middles.
 pub(crate) const LABEL_GAP: f64 = 14.0;
 const LEAST_X_PITCH: f64 = 40.0;
 const LEAST_Y_PITCH: f64 = 26.0;
 
-/// A value with a grid line and a label.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Tick {
     pub value: f64,
     pub label: String,
 }
 
-/// The ticks `asked`, as far as they fit; without them the finest round ones that `fits` accepts. `fits` must accept a single tick.
+/// Returns the ticks `asked` that fit, or the finest round ones that `fits` accepts. `fits` must
+/// accept a single tick.
 pub(crate) fn choose_ticks(
     axis: &AxisScale,
     asked: Option<&[(f64, String)]>,
@@ -199,8 +196,7 @@ pub(crate) fn choose_ticks(
     }
 }
 
-/// Positions of unlabelled grid lines between the decades of a logarithmic axis; empty if the ticks are not
-/// successive decades.
+/// Unlabelled grid lines between successive decades of a logarithmic axis.
 pub(crate) fn minor_ticks(axis: &AxisScale, ticks: &[Tick]) -> Vec<f64> {
     let decades =
         ticks.len() > 1 && ticks.windows(2).all(|pair| (pair[1].value / pair[0].value - 10.0).abs() < 1e-6);
@@ -210,7 +206,7 @@ pub(crate) fn minor_ticks(axis: &AxisScale, ticks: &[Tick]) -> Vec<f64> {
     multiples_of_decades(axis, &[2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0], 1)
 }
 
-/// The ticks `asked`, without those off the axis and those without room.
+/// Returns the ticks `asked` that are on the axis and fit.
 fn chosen(axis: &AxisScale, asked: &[(f64, String)], fits: &dyn Fn(&[Tick]) -> bool) -> Vec<Tick> {
     let on_axis = asked.iter().filter(|(value, _)| is_on_axis(axis, *value));
     let mut asked: Vec<Tick> =
@@ -269,7 +265,6 @@ fn logarithmic(axis: &AxisScale, fits: &dyn Fn(&[Tick]) -> bool) -> Vec<Tick> {
         .unwrap_or_else(|| labelled(multiples_of_decades(axis, &[1.0], 1).into_iter().take(1).collect()))
 }
 
-/// `multiples` of every `stride`-th power of ten that lie on the axis.
 fn multiples_of_decades(axis: &AxisScale, multiples: &[f64], stride: i32) -> Vec<f64> {
     let first = axis.low.log10().floor() as i32;
     let last = axis.high.log10().floor() as i32;
@@ -302,7 +297,7 @@ fn log_label(value: f64) -> String {
     }
 }
 
-/// A number as a person would write it: at most six digits.
+/// Formats a number with at most six digits.
 pub(crate) fn plain(value: f64) -> String {
     match exponent(value) {
         _ if value == 0.0 => "0".to_owned(),
@@ -315,7 +310,7 @@ pub(crate) fn plain(value: f64) -> String {
     }
 }
 
-/// The power of ten of the first digit; rounded up for a value that prints as the next power.
+/// Power of ten of the first digit; rounded up for a value that prints as the next power.
 fn exponent(value: f64) -> i32 {
     (value.abs().log10() + 1e-9).floor() as i32
 }
@@ -328,7 +323,7 @@ fn scientific(value: f64, decimals: usize) -> String {
     format!("{mantissa}e{power}").replace('-', "−")
 }
 
-/// A decimal number with a comma between thousands and a true minus sign.
+/// Adds thousands separators and a true minus sign.
 fn grouped(number: &str) -> String {
     let (sign, magnitude) = number.strip_prefix('-').map_or(("", number), |rest| ("−", rest));
     let whole = magnitude.find('.').unwrap_or(magnitude.len());
@@ -342,7 +337,6 @@ fn grouped(number: &str) -> String {
     text
 }
 
-/// The labels of both axes of a plot.
 pub(crate) fn tick_labels(
     plot: &Rect,
     (x, x_ticks): (&AxisScale, &[Tick]),
@@ -366,12 +360,12 @@ pub(crate) fn tick_labels(
     columns.chain(rows).collect()
 }
 
-/// Whether labels above each other are far enough apart on an axis of this height.
+/// Returns true if labels above each other are far enough apart.
 pub(crate) fn rows_fit(axis: &AxisScale, ticks: &[Tick], height: f64) -> bool {
     pairs(axis, ticks).all(|(pitch, _, _)| pitch * height >= LEAST_Y_PITCH)
 }
 
-/// Whether labels beside each other are far enough apart on an axis of this width.
+/// Returns true if labels beside each other are far enough apart.
 pub(crate) fn columns_fit(axis: &AxisScale, ticks: &[Tick], width: f64) -> bool {
     pairs(axis, ticks).all(|(pitch, before, after)| {
         let labels = text::width(&before.label, TICK_SIZE) / 2.0 + text::width(&after.label, TICK_SIZE) / 2.0;
@@ -379,7 +373,6 @@ pub(crate) fn columns_fit(axis: &AxisScale, ticks: &[Tick], width: f64) -> bool 
     })
 }
 
-/// Neighbouring ticks with their distance as a share of the axis.
 fn pairs<'t>(axis: &AxisScale, ticks: &'t [Tick]) -> impl Iterator<Item = (f64, &'t Tick, &'t Tick)> {
     ticks.windows(2).map(|pair| {
         let pitch = axis.tick_share(pair[1].value) - axis.tick_share(pair[0].value);

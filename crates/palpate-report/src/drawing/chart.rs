@@ -1,26 +1,26 @@
-//! The chart as data: series, marks and their range, without any drawing.
+//! Data of a chart: series, marks and axes, without drawing.
 
 use super::axis::Axis;
 
-/// A chart of one plot area, its title, axes, series and legend.
+/// A chart with title, axes, series and legend.
 ///
-/// Any data can be drawn. Values that are not finite (or beyond ±1e300) break a line and are otherwise left
-/// out, and so are values that are not positive on a logarithmic axis. A chart without data shows empty axes.
+/// Values that are not finite or beyond ±1e300 break a line, as do non-positive values on a
+/// logarithmic axis. A chart without data shows empty axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
-    /// Heading; wrapped onto at most two lines. Empty for none.
+    /// Heading of at most two lines; may be empty.
     pub title: String,
     /// Horizontal axis.
     pub x: Axis,
-    /// Vertical axis; the label stands above the plot, unrotated.
+    /// Vertical axis, with the label above the plot.
     pub y: Axis,
-    /// Data to draw, later series over earlier ones within each kind: bands lie under lines, lines under points.
+    /// Series; bands lie under lines, lines under points, later series over earlier ones.
     pub series: Vec<Series>,
     /// Reference lines and shaded ranges behind the data.
     pub marks: Vec<Mark>,
-    /// Width of the image in pixels at scale 1; drawn within 320 to 4,000.
+    /// Width in pixels, limited to 320 to 4,000.
     pub width_px: u32,
-    /// Height of the image in pixels at scale 1, legend included; drawn within 280 to 4,000.
+    /// Height in pixels with the legend, limited to 280 to 4,000.
     pub height_px: u32,
 }
 
@@ -31,7 +31,7 @@ impl Default for Chart {
 }
 
 impl Chart {
-    /// A chart of 720 × 440 pixels without marks.
+    /// Returns a chart of 720 × 440 pixels without marks.
     pub fn new(title: impl Into<String>, x: Axis, y: Axis, series: Vec<Series>) -> Self {
         Chart { title: title.into(), x, y, series, marks: Vec::new(), width_px: 720, height_px: 440 }
     }
@@ -47,13 +47,13 @@ impl Chart {
     }
 }
 
-/// Data that are drawn in one way, with one entry in the legend.
+/// Data with one shape, colour and legend entry.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// Name in the legend; empty keeps the series out of it.
+    /// Name in the legend; without one, no entry.
     pub label: String,
-    /// Index into seven colours that colour-blind readers can distinguish (Okabe and Ito): blue, vermilion,
-    /// green, purple, sky blue, orange, black; larger indices start over.
+    /// Index into seven colours for colour-blind readers (Okabe and Ito), cyclic: blue, vermilion,
+    /// green, purple, sky blue, orange, black.
     pub colour: usize,
     /// Shape and data.
     pub kind: SeriesKind,
@@ -65,7 +65,7 @@ impl Series {
         Series::new(label, colour, SeriesKind::Line { points, stroke: Stroke::Solid })
     }
 
-    /// A broken line through `points`.
+    /// A dashed line through `points`.
     pub fn dashes(label: impl Into<String>, colour: usize, points: Vec<(f64, f64)>) -> Self {
         Series::new(label, colour, SeriesKind::Line { points, stroke: Stroke::Dashed })
     }
@@ -80,7 +80,7 @@ impl Series {
         Series::new(label, colour, SeriesKind::Points { points, marker })
     }
 
-    /// Unconnected markers with a vertical bar.
+    /// Unconnected markers with vertical error bars.
     pub fn error_bars(
         label: impl Into<String>,
         colour: usize,
@@ -90,7 +90,7 @@ impl Series {
         Series::new(label, colour, SeriesKind::ErrorBars { points, marker })
     }
 
-    /// Whether the series is an area between two curves.
+    /// Returns true for an area between two curves.
     pub fn is_band(&self) -> bool {
         matches!(self.kind, SeriesKind::Band { .. })
     }
@@ -103,29 +103,28 @@ impl Series {
 /// Shape and data of a series.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SeriesKind {
-    /// A line through the points in their order.
+    /// A line through the points in order.
     Line {
-        /// (x, y) in the units of the axes.
+        /// (x, y) in units of the axes.
         points: Vec<(f64, f64)>,
         /// Solid or dashed.
         stroke: Stroke,
     },
     /// A translucent area between two curves.
     Band {
-        /// Lower and upper edge at each x. On a logarithmic axis an edge that is not positive lies on the
-        /// end of the axis.
+        /// Edges; non-positive ones lie on the end of a logarithmic axis.
         points: Vec<BandPoint>,
     },
     /// Unconnected markers.
     Points {
-        /// (x, y) in the units of the axes.
+        /// (x, y) in units of the axes.
         points: Vec<(f64, f64)>,
         /// Shape of each marker.
         marker: Marker,
     },
-    /// Unconnected markers with a vertical bar.
+    /// Unconnected markers with vertical error bars.
     ErrorBars {
-        /// Each marker and the two ends of its bar.
+        /// Markers and ends of their bars.
         points: Vec<ErrorPoint>,
         /// Shape of each marker.
         marker: Marker,
@@ -138,24 +137,24 @@ pub enum Stroke {
     /// Unbroken.
     #[default]
     Solid,
-    /// Broken.
+    /// Dashed.
     Dashed,
 }
 
 /// Shape of a marker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Marker {
-    /// A filled disc.
+    /// Filled disc.
     Circle,
-    /// A filled square.
+    /// Filled square.
     Square,
-    /// A filled triangle, apex up.
+    /// Filled triangle, apex up.
     Triangle,
-    /// A diagonal cross.
+    /// Diagonal cross.
     Cross,
 }
 
-/// The edges of a band at one x.
+/// Edges of a band at one x.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BandPoint {
     /// Horizontal position.
@@ -171,49 +170,49 @@ pub struct BandPoint {
 pub struct ErrorPoint {
     /// Horizontal position.
     pub x: f64,
-    /// The value itself.
+    /// Value.
     pub y: f64,
-    /// Lower end of the bar. On a logarithmic axis an end that is not positive lies on the end of the axis.
+    /// Lower end; a non-positive one lies on the end of a logarithmic axis.
     pub low: f64,
-    /// Upper end of the bar.
+    /// Upper end.
     pub high: f64,
 }
 
 /// A reference behind the data.
 ///
-/// Labels of vertical marks stand above the plot, in at most three rows; a label without room is left out
-/// while its mark stays. A horizontal mark is named in the legend.
+/// Labels of vertical marks are above the plot, in at most three rows; labels without room are
+/// omitted. Horizontal marks are named in the legend.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Mark {
     /// A dashed vertical line, such as a support.
     VerticalLine {
         /// Position.
         x: f64,
-        /// Name; empty for none.
+        /// Name; may be empty.
         label: String,
     },
     /// A dashed horizontal line, such as a tolerance.
     HorizontalLine {
         /// Position.
         y: f64,
-        /// Name in the legend; empty for none.
+        /// Name in the legend; may be empty.
         label: String,
     },
     /// A shaded range of x, such as a portion of a beam.
     Span {
         /// One end.
         low: f64,
-        /// The other end.
+        /// Other end.
         high: f64,
-        /// Name; empty for none.
+        /// Name; may be empty.
         label: String,
     },
 }
 
-/// Least ratio of the greatest to the least of positive values for a logarithmic axis.
+/// Least ratio of positive values for a logarithmic axis.
 const LOGARITHMIC_FROM: f64 = 10.0;
 
-/// The least and the greatest of some values; zeros without a number.
+/// Smallest and largest value; zeros without a number.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Extremes {
     pub least: f64,
@@ -230,7 +229,7 @@ impl Extremes {
         finite.fold(None, wider).unwrap_or_default()
     }
 
-    /// Extremes of the heights of all lines.
+    /// Extremes of all lines.
     pub fn from_lines(series: &[Series]) -> Self {
         Self::from_values(series.iter().flat_map(|series| match &series.kind {
             SeriesKind::Line { points, .. } => points.iter().map(|point| point.1).collect(),
@@ -238,12 +237,12 @@ impl Extremes {
         }))
     }
 
-    /// Whether only a logarithmic axis shows both ends.
+    /// Returns true if only a logarithmic axis shows both ends.
     pub fn are_far_apart(self) -> bool {
         self.least > 0.0 && self.greatest >= LOGARITHMIC_FROM * self.least
     }
 
-    /// An axis that shows both ends: logarithmic if they are far apart.
+    /// Axis with both ends: logarithmic if they are far apart.
     pub fn axis(self, label: &str) -> Axis {
         if self.are_far_apart() { Axis::log10(label) } else { Axis::linear(label) }
     }

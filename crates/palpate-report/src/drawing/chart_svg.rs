@@ -17,10 +17,10 @@ const CROSS_WIDTH: f64 = 2.0;
 const BAND_OPACITY: f64 = 0.2;
 const SPAN_OPACITY: f64 = 0.05;
 
-/// Draws the chart as one self-contained SVG document, `width_px` × `height_px` in size.
+/// Draws a chart as a self-contained SVG document of `width_px` × `height_px`.
 ///
-/// The legend stands beneath the plot. If it has too little room for all names, its last entry gives the number of
-/// missing ones. Texts are set in the reader's sans-serif font.
+/// A legend without room for all names ends with the number of missing ones. Texts have the
+/// reader's sans-serif font.
 pub fn chart_to_svg(chart: &Chart) -> String {
     let layout = Layout::new(chart);
     let mut painter = Painter { svg: Svg::new(layout.width_px, layout.height_px), layout: &layout };
@@ -195,7 +195,6 @@ impl Painter<'_> {
         }
     }
 
-    /// Draws a sample of the series for the legend.
     fn swatch(&mut self, series: &Series, area: Rect) {
         let colour = palette(series.colour);
         let Rect { left, right, top, bottom } = area;
@@ -214,7 +213,7 @@ impl Painter<'_> {
     }
 }
 
-/// The longest runs of items without a gap.
+/// Splits items at gaps.
 fn runs<T>(items: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
     let mut runs = vec![Vec::new()];
     for item in items {
@@ -227,7 +226,7 @@ fn runs<T>(items: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
     runs
 }
 
-/// A white ground a little larger than the marker, which keeps it apart from lines of other series.
+/// Draws a white ground, slightly larger than the marker.
 fn draw_rim(svg: &mut Svg, at: Point, marker: Marker) {
     draw_shape(svg, at, marker, MARKER_RADIUS + MARKER_RIM, CROSS_WIDTH + MARKER_RIM, WHITE);
 }
@@ -236,7 +235,7 @@ fn draw_marker(svg: &mut Svg, at: Point, marker: Marker, colour: Colour) {
     draw_shape(svg, at, marker, MARKER_RADIUS, CROSS_WIDTH, colour);
 }
 
-/// Draws a marker; all shapes look equally large at the same `radius`.
+/// Draws a marker; all shapes look equally large at one `radius`.
 fn draw_shape(svg: &mut Svg, at: Point, marker: Marker, radius: f64, cross_width: f64, colour: Colour) {
     match marker {
         Marker::Circle => svg.disc(at, radius, colour),
@@ -253,7 +252,7 @@ fn square((x, y): Point, half: f64) -> Rect {
     Rect { left: x - half, right: x + half, top: y - half, bottom: y + half }
 }
 
-/// An equilateral triangle, apex up, with its centre at the point and its corners at `radius` from it.
+/// Equilateral triangle, apex up, with corners at `radius` from the centre.
 fn triangle((x, y): Point, radius: f64) -> [Point; 3] {
     let half_side = radius * 0.75_f64.sqrt();
     [(x, y - radius), (x + half_side, y + radius / 2.0), (x - half_side, y + radius / 2.0)]

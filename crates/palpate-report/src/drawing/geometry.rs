@@ -1,4 +1,4 @@
-//! Rectangles in pixels, and lines and polygons cut off at them.
+//! Rectangles in pixels, and clipping of lines and polygons.
 
 /// A point in pixels, y downward.
 pub(crate) type Point = (f64, f64);
@@ -21,7 +21,6 @@ impl Rect {
         self.bottom - self.top
     }
 
-    /// Moves the rectangle to the right and down.
     pub fn moved(&self, right: f64, down: f64) -> Rect {
         Rect {
             left: self.left + right,
@@ -31,12 +30,12 @@ impl Rect {
         }
     }
 
-    /// Whether the point lies inside or on the edge.
+    /// Returns true for a point inside or on the edge.
     pub fn contains(&self, (x, y): Point) -> bool {
         (self.left..=self.right).contains(&x) && (self.top..=self.bottom).contains(&y)
     }
 
-    /// The four half-planes that intersect in this rectangle: signed distances, positive inside.
+    /// Signed distances from the four edges, positive inside.
     fn insides(&self) -> [impl Fn(Point) -> f64 + use<>; 4] {
         let Rect { left, top, right, bottom } = *self;
         let half_plane =
@@ -49,7 +48,7 @@ impl Rect {
         ]
     }
 
-    /// The pieces of the polyline through `points` that lie inside.
+    /// Pieces of a polyline inside.
     pub fn clip_line(&self, points: &[Point]) -> Vec<Vec<Point>> {
         let mut pieces: Vec<Vec<Point>> = Vec::new();
         for ends in points.windows(2) {
@@ -62,7 +61,7 @@ impl Rect {
         pieces
     }
 
-    /// The part of a segment that lies inside (Liang and Barsky).
+    /// Part of a segment inside (Liang and Barsky).
     fn clip_segment(&self, start: Point, end: Point) -> Option<(Point, Point)> {
         let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
         for inside in self.insides() {
@@ -79,7 +78,7 @@ impl Rect {
         (enter <= leave).then_some((first, last))
     }
 
-    /// The part of a polygon that lies inside (Sutherland and Hodgman); empty for a polygon outside.
+    /// Part of a polygon inside (Sutherland and Hodgman); may be empty.
     pub fn clip_polygon(&self, points: &[Point]) -> Vec<Point> {
         let mut clipped = points.to_vec();
         for inside in self.insides() {

@@ -1,4 +1,4 @@
-//! A quantity over a plane in colours: one map, or several of one plane and scale beside each other.
+//! Heat maps of a quantity over a plane, with one colour scale.
 
 use super::axis::{Axis, AxisScale, TICK_SIZE, Tick, choose_ticks, columns_fit, rows_fit, tick_labels};
 use super::chart::Extremes;
@@ -12,60 +12,60 @@ const TITLE_SIZE: f64 = 15.0;
 const TITLE_LINE: f64 = 26.0;
 const NAME_SIZE: f64 = 12.5;
 const NAME_LINE: f64 = 28.0;
-/// Distance from the top of a map or of the colour bar up to the middle of its name, above the uppermost label beside it.
+/// Distance from the top of a map or colour bar to the middle of its name, above the labels beside
+/// it.
 const NAME_RISE: f64 = 17.0;
-/// Room left of a map for the labels of its ticks, and beneath it.
+/// Room for tick labels, left of a map and beneath it.
 const GUTTER: f64 = 40.0;
 const FOOT: f64 = 26.0;
-/// Distance from one map to the next.
 const GAP: f64 = 18.0;
 const BAR_WIDTH: f64 = 16.0;
-/// Room for the labels of the colour bar.
 const BAR_LABELS: f64 = 54.0;
 /// Least width of one map beside another.
 const LEAST_WIDTH: f64 = 120.0;
 /// Greatest height of one map.
 const MOST_HEIGHT: f64 = 420.0;
-/// Overlap of neighbouring cells; without it a line of background would show between them.
+/// Overlap of neighbouring cells, which hides the background between them.
 const OVERLAP: f64 = 0.5;
 
 /// A quantity over a plane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeatMap {
-    /// Heading, in one line or two.
+    /// Heading of at most two lines.
     pub title: String,
-    /// The plane, divided into cells of one value each.
+    /// Cells of the plane, with one value each.
     pub cells: Cells,
-    /// The maps.
+    /// Maps.
     pub panels: Vec<HeatPanel>,
-    /// Positions of the dots, such as sensors, in millimetres.
+    /// Positions of dots, such as sensors, in millimetres.
     pub dots_mm: Vec<(f64, f64)>,
-    /// Meaning of the colours, with its unit: "limit, mm".
+    /// Quantity of the colours with its unit: "limit, mm".
     pub label: String,
     /// Upper end of the scale; larger values have its colour.
     pub most: f64,
-    /// Width of the image in pixels at scale 1; drawn within 320 to 4,000. The height follows from the plane.
+    /// Width in pixels, limited to 320 to 4,000. The height follows from the plane.
     pub width_px: u32,
 }
 
 /// One map.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeatPanel {
-    /// Name; empty for none.
+    /// Name; may be empty.
     pub name: String,
-    /// A value for each cell; a cell with a value that is not finite is grey.
+    /// A value for each cell; cells without a finite value are grey.
     pub values: Vec<f64>,
 }
 
 impl HeatPanel {
-    /// A map with its name; the name may be empty.
+    /// Returns a map; the name may be empty.
     pub fn new(name: impl Into<String>, values: Vec<f64>) -> Self {
         Self { name: name.into(), values }
     }
 }
 
-/// Draws the maps as one self-contained SVG document: x to the right, y upward, with equal scales, and one
-/// colour bar for all. The scale is logarithmic if the largest value is ten times the smallest, and all are positive.
+/// Draws the maps as a self-contained SVG document with one colour bar: x to the right, y upward,
+/// equal scales. The colours are logarithmic if all values are positive and the largest is ten
+/// times the smallest.
 ///
 /// ```
 /// use palpate_estimators::load_profile::Cells;
@@ -100,13 +100,12 @@ pub fn heat_map_to_svg(map: &HeatMap) -> String {
     svg.finish()
 }
 
-/// Length and width of the plane in millimetres.
 fn sides_mm(map: &HeatMap) -> [f64; 2] {
     let extent = map.cells.extent;
     [extent.length_m() * 1e3, extent.width_m().unwrap_or(extent.length_m()) * 1e3]
 }
 
-/// The lines of a title at the top of an image.
+/// Lines of a title at the top of an image.
 fn title_labels(title: &str, width: f64) -> Vec<Label> {
     const MOST_LINES: usize = 2;
     let lines = text::wrap(title, TITLE_SIZE, width - 2.0 * MARGIN, MOST_LINES).into_iter().enumerate();
@@ -117,7 +116,6 @@ fn title_labels(title: &str, width: f64) -> Vec<Label> {
     lines.map(label).collect()
 }
 
-/// Layout of a figure of maps, in pixels.
 struct Layout {
     width: f64,
     height: f64,
@@ -168,10 +166,9 @@ impl Layout {
         Self { width, height, title, plots, bar, colours: colours(map), x, y }
     }
 
-    /// Room for the name of a map.
     fn name_room(&self, plot: Rect) -> f64 {
         let is_last_of_row = !self.plots.iter().any(|other| other.top == plot.top && other.left > plot.left);
-        // To the right of the name stands the name of the next map's axis, or the colour bar.
+        // The next map's axis name or the colour bar is to the right of the name.
         let is_beneath_bar = plot.top > self.bar.bottom;
         if is_last_of_row && is_beneath_bar {
             self.width - MARGIN - plot.left
@@ -180,7 +177,6 @@ impl Layout {
         }
     }
 
-    /// Name and ticks of one map.
     fn labels_of(&self, panel: &HeatPanel, plot: Rect) -> Vec<Label> {
         let label = |text: &str, at: Point, anchor| Label {
             text: text.to_owned(),
@@ -228,7 +224,6 @@ impl Layout {
     }
 }
 
-/// The scale of the colours.
 fn colours(map: &HeatMap) -> AxisScale {
     let all = map.panels.iter().flat_map(|panel| panel.values.iter().copied());
     let finite = all.filter(|value| value.is_finite());
@@ -251,7 +246,7 @@ fn draw_cells(svg: &mut Svg, map: &HeatMap, panel: &HeatPanel, plot: Rect, colou
     }
 }
 
-/// Draws white rings with a dark middle, which are visible on any colour.
+/// Draws white rings with a dark middle, visible on any colour.
 fn draw_dots(svg: &mut Svg, map: &HeatMap, plot: Rect) {
     let (rim, middle) = if plot.width() < 200.0 { (3.2, 1.9) } else { (4.8, 3.0) };
     let [length_mm, width_mm] = sides_mm(map);
@@ -262,8 +257,8 @@ fn draw_dots(svg: &mut Svg, map: &HeatMap, plot: Rect) {
     }
 }
 
-/// Viridis at ten even steps (van der Walt and Smith, 2015; public domain): the lightness of the colours rises with the value. So
-/// readers who see few colours can distinguish them, also in print without any.
+/// Viridis at ten even steps (van der Walt and Smith, 2015; public domain). Lightness rises with
+/// the value, so the colours are distinguishable for all readers and in grey print.
 const VIRIDIS: [Colour; 10] = [
     Colour::opaque(68, 1, 84),
     Colour::opaque(72, 40, 120),
@@ -277,7 +272,7 @@ const VIRIDIS: [Colour; 10] = [
     Colour::opaque(253, 231, 37),
 ];
 
-/// The colour for a share of the scale, 0 to 1; beyond it the colour of the nearer end.
+/// Colour for a share of the scale, clamped to 0 to 1.
 fn colour_of(share: f64) -> Colour {
     let place = share.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f64;
     let below = (place as usize).min(VIRIDIS.len() - 2);

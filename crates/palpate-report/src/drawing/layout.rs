@@ -1,7 +1,7 @@
-//! Layout of a chart, in pixels, determined before the drawing, so that it can be tested.
+//! Layout of a chart, in pixels.
 //!
-//! From top to bottom: title, label of the vertical axis, names of vertical marks, plot, tick labels, label of
-//! the horizontal axis, legend. Each has a strip of its own, so no text can lie over data.
+//! Each of title, vertical axis label, names of marks, plot, tick labels, horizontal axis label and
+//! legend has a strip of its own. So no text can lie over data.
 
 use super::axis::{
     AxisScale, LABEL_GAP, TICK_GAP, TICK_SIZE, Tick, choose_ticks, columns_fit, rows_fit, tick_labels,
@@ -19,18 +19,17 @@ const AXIS_LABEL_LINE: f64 = 20.0;
 const TICK_LINE: f64 = 24.0;
 const MARK_SIZE: f64 = 11.5;
 const MARK_LINE: f64 = 17.0;
-/// Distance from the header to the plot or the names of marks, and from the axis label to the legend.
+/// Distance from the header to the plot or names of marks, and from the axis label to the legend.
 const STRIP_GAP: f64 = 8.0;
 /// Greatest number of rows of names above the plot.
 const MARK_ROWS: usize = 3;
-/// Share of the image's height that the legend leaves to the plot.
+/// Share of the height that the legend leaves to the plot.
 const LEAST_PLOT_SHARE: f64 = 0.25;
-/// Least room left of the plot: half of the widest label of a tick.
+/// Least room left of the plot: half of the widest tick label.
 const LEAST_GUTTER: f64 = 44.0;
-/// Half of the widest label of a tick, for one at the right end of the axis.
+/// Half of the widest tick label, at the right end of the axis.
 const OVERHANG: f64 = 36.0;
 
-/// The places of all parts of one chart.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Layout<'a> {
     pub width_px: u32,
@@ -40,13 +39,11 @@ pub(crate) struct Layout<'a> {
     pub y: AxisScale,
     pub x_ticks: Vec<Tick>,
     pub y_ticks: Vec<Tick>,
-    /// Title, axis labels, tick labels and names of marks.
     pub labels: Vec<Label>,
     pub legend: Legend<'a>,
 }
 
 impl<'a> Layout<'a> {
-    /// Determines all places.
     pub fn new(chart: &'a Chart) -> Self {
         let (width_px, height_px) = (chart.width_px.clamp(320, 4000), chart.height_px.clamp(280, 4000));
         let (width, height) = (f64::from(width_px), f64::from(height_px));
@@ -85,27 +82,25 @@ impl<'a> Layout<'a> {
         Layout { width_px, height_px, plot, x, y, x_ticks, y_ticks, labels, legend }
     }
 
-    /// Point of the drawing for a point of the data; `None` for a point that an axis cannot show.
+    /// Maps data to pixels; `None` for a point that an axis cannot show.
     pub fn place(&self, x: f64, y: f64) -> Option<Point> {
         Some((self.x_px(self.x.share(x)?), self.y_px(self.y.share(y)?)))
     }
 
-    /// Point of the drawing for a point of the data; `None` outside the plot.
+    /// Maps data to pixels; `None` outside the plot.
     pub fn place_inside(&self, x: f64, y: f64) -> Option<Point> {
         self.place(x, y).filter(|&at| self.plot.contains(at))
     }
 
-    /// Point as of [`Layout::place`], but a y that is not positive lies on the low end of a logarithmic axis.
+    /// [`Layout::place`], but a non-positive y lies on the low end of a logarithmic axis.
     pub fn place_edge(&self, x: f64, y: f64) -> Option<Point> {
         Some((self.x_px(self.x.share(x)?), self.y_px(self.y.share_or_low_end(y)?)))
     }
 
-    /// Pixels from the left at a share of the horizontal axis.
     pub fn x_px(&self, share: f64) -> f64 {
         self.plot.left + share * self.plot.width()
     }
 
-    /// Pixels from the top at a share of the vertical axis.
     pub fn y_px(&self, share: f64) -> f64 {
         self.plot.bottom - share * self.plot.height()
     }
@@ -115,7 +110,7 @@ fn line_if(text: &str, line: f64) -> f64 {
     if text.trim().is_empty() { 0.0 } else { line }
 }
 
-/// Title and label of the vertical axis, and the top of the room beneath them.
+/// Title and vertical axis label, and the top of the room beneath them.
 fn header(chart: &Chart, width: f64) -> (Vec<Label>, f64) {
     let room = width - 2.0 * MARGIN;
     let at_left = |text: String, top: f64, line: f64, size: f64, colour| Label {
@@ -137,7 +132,7 @@ fn header(chart: &Chart, width: f64) -> (Vec<Label>, f64) {
     (labels, top + STRIP_GAP)
 }
 
-/// The label of the horizontal axis, under the middle of the plot as far as the image allows.
+/// Horizontal axis label, under the middle of the plot as far as the image allows.
 fn x_axis_label(chart: &Chart, plot: &Rect, width: f64) -> Option<Label> {
     let text = text::wrap(&chart.x.label, AXIS_LABEL_SIZE, width - 2.0 * MARGIN, 1).pop()?;
     let half = text::width(&text, AXIS_LABEL_SIZE) / 2.0;
@@ -151,7 +146,6 @@ fn x_axis_label(chart: &Chart, plot: &Rect, width: f64) -> Option<Label> {
     })
 }
 
-/// Middle (in data) and name of every vertical mark with a name.
 fn vertical_names(chart: &Chart) -> impl Iterator<Item = ((f64, f64), &str)> {
     chart
         .marks
@@ -164,7 +158,8 @@ fn vertical_names(chart: &Chart) -> impl Iterator<Item = ((f64, f64), &str)> {
         .filter(|(_, label)| !label.trim().is_empty())
 }
 
-/// Names of the vertical marks between `left` and `right`, the lowest row first, and the number of rows.
+/// Names of the vertical marks between `left` and `right`, lowest row first; also returns the
+/// number of rows.
 fn mark_labels(chart: &Chart, x: &AxisScale, (left, right): (f64, f64), top: f64) -> (usize, Vec<Label>) {
     let mut rows = text::Rows::default();
     let mut placed = Vec::new();
@@ -198,7 +193,7 @@ fn widest(ticks: &[Tick]) -> f64 {
     ticks.iter().map(|tick| text::width(&tick.label, TICK_SIZE)).fold(0.0, f64::max)
 }
 
-/// Length by which the label of the last tick reaches beyond the axis.
+/// Length by which the last tick's label exceeds the axis.
 fn overhang(axis: &AxisScale, ticks: &[Tick], width: f64) -> f64 {
     let reach = ticks.last().map_or(0.0, |tick| {
         let half = text::width(&tick.label, TICK_SIZE) / 2.0;
@@ -207,7 +202,6 @@ fn overhang(axis: &AxisScale, ticks: &[Tick], width: f64) -> f64 {
     reach.clamp(4.0, OVERHANG)
 }
 
-/// All values of x and of y in the chart's data and marks.
 fn values(chart: &Chart) -> (Vec<f64>, Vec<f64>) {
     let (mut xs, mut ys) = (Vec::new(), Vec::new());
     for series in &chart.series {
@@ -238,7 +232,6 @@ fn values(chart: &Chart) -> (Vec<f64>, Vec<f64>) {
     (xs, ys)
 }
 
-/// Height of a row of the legend.
 const ROW_HEIGHT: f64 = 20.0;
 const NAME_SIZE: f64 = 12.0;
 const SWATCH_WIDTH: f64 = 24.0;
@@ -246,26 +239,22 @@ const SWATCH_WIDTH: f64 = 24.0;
 const INDENT: f64 = 31.0;
 const GAP: f64 = 18.0;
 
-/// Series or mark of an entry.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Named<'a> {
     Series(&'a Series),
-    /// A horizontal reference line.
     Reference,
 }
 
-/// One name and its place.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Entry<'a> {
     pub named: Named<'a>,
-    /// Box for the sample of the drawing.
+    /// Box of the sample.
     pub swatch: Rect,
     pub label: Label,
-    /// Room of swatch and name.
     pub area: Rect,
 }
 
-/// The legend of a chart, with its own left and top at zero until it is moved.
+/// Legend of a chart, at the origin until it is moved.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Legend<'a> {
     pub entries: Vec<Entry<'a>>,
@@ -276,7 +265,7 @@ pub(crate) struct Legend<'a> {
 }
 
 impl<'a> Legend<'a> {
-    /// Entries from left to right in rows of `width`, in no more than `most_rows` rows.
+    /// Arranges entries in at most `most_rows` rows of `width`.
     pub fn new(chart: &'a Chart, width: f64, most_rows: usize) -> Self {
         let names: Vec<(Named<'_>, String)> =
             names(chart).map(|(named, name)| (named, text::fit(name, NAME_SIZE, width - INDENT))).collect();
@@ -301,7 +290,6 @@ impl<'a> Legend<'a> {
         }
     }
 
-    /// Moves the legend by `left` and `top`.
     pub fn moved(mut self, left: f64, top: f64) -> Self {
         for entry in &mut self.entries {
             entry.swatch = entry.swatch.moved(left, top);
@@ -314,14 +302,13 @@ impl<'a> Legend<'a> {
     }
 }
 
-/// Place of an entry in the legend.
 struct Place {
     left: f64,
     row: usize,
     width: f64,
 }
 
-/// Places of the first `kept` names and, if these are not all, of the remark about the others.
+/// Arranges the first `kept` names, with a remark if they are not all.
 fn arrange(names: &[(Named<'_>, String)], kept: usize, width: f64) -> Vec<Place> {
     let mut widths: Vec<f64> =
         names[..kept].iter().map(|(_, name)| INDENT + text::width(name, NAME_SIZE)).collect();

@@ -1,7 +1,6 @@
-//! Charts and heat maps as SVG: plain data in, text out, independent of the subject of the data.
+//! Charts and heat maps as SVG, independent of the subject of the data.
 //!
-//! A chart is laid out before it is drawn (`layout`). The ends and labels of the axes are determined (`axis`), names get room
-//! beneath the plot. Only then are lines and shapes written (`chart_svg`, `svg`).
+//! A chart is laid out (`layout`, `axis`) before it is drawn (`chart_svg`, `svg`).
 
 pub(crate) mod axis;
 pub(crate) mod chart;

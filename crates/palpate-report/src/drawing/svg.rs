@@ -1,16 +1,14 @@
-//! An SVG document, written shape by shape in pixels.
+//! SVG document of shapes in pixels.
 
 use super::geometry::{Point, Rect};
 use std::fmt::{self, Write};
 
-/// Distance from the middle of the capitals down to the baseline, in units of the font size.
+/// Distance from the middle of the capitals to the baseline, in units of the font size.
 const CAPITALS_HALF_HEIGHT: f64 = 0.36;
 
-/// A colour and how opaque it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Colour {
     pub rgb: [u8; 3],
-    /// 0 to 1.
     pub opacity: f64,
 }
 
@@ -33,7 +31,7 @@ const PALETTE: [Colour; 7] = [
     BLACK,
 ];
 
-/// Every colour of a drawing, and its replacement on a dark page. Colours of a map's values are the same on both.
+/// Replacement of each drawing colour on a dark page. Colours of a map's values stay.
 pub(crate) const IN_THE_DARK: [(Colour, Colour); 13] = [
     (INK, Colour::opaque(227, 230, 232)),
     (QUIET_INK, Colour::opaque(176, 182, 187)),
@@ -50,7 +48,7 @@ pub(crate) const IN_THE_DARK: [(Colour, Colour); 13] = [
     (PALETTE[5], Colour::opaque(255, 200, 87)),
 ];
 
-/// The colour with this index; the palette starts over at its end.
+/// Colour with this index, cyclic.
 pub(crate) fn palette(index: usize) -> Colour {
     PALETTE[index % PALETTE.len()]
 }
@@ -65,7 +63,7 @@ impl Colour {
     }
 }
 
-/// Written as "#0072b2"; opacity is an attribute of its own.
+/// Formats "#0072b2"; opacity is a separate attribute.
 impl fmt::Display for Colour {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [red, green, blue] = self.rgb;
@@ -73,7 +71,6 @@ impl fmt::Display for Colour {
     }
 }
 
-/// The fill of a shape, as attributes.
 struct Fill(Colour);
 
 impl fmt::Display for Fill {
@@ -83,7 +80,6 @@ impl fmt::Display for Fill {
     }
 }
 
-/// Part of a text that stands at its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Anchor {
     Start,
@@ -91,25 +87,23 @@ pub(crate) enum Anchor {
     End,
 }
 
-/// A text with its place.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Label {
     pub text: String,
     /// Horizontally the position of `anchor`, vertically the middle of the capitals.
     pub at: Point,
     pub anchor: Anchor,
-    /// Font size in pixels.
     pub size: f64,
     pub colour: Colour,
 }
 
-/// An SVG document with a size in pixels; parts beyond its edge are invisible.
+/// SVG document with a size in pixels; parts beyond the edge are invisible.
 pub(crate) struct Svg {
     text: String,
 }
 
 impl Svg {
-    /// A white image. Texts are set in the reader's sans-serif font.
+    /// A white image. Texts have the reader's sans-serif font.
     pub fn new(width_px: u32, height_px: u32) -> Self {
         let text = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width_px}\" height=\"{height_px}\" viewBox=\"0 0 {width_px} \
@@ -121,18 +115,17 @@ impl Svg {
         svg
     }
 
-    /// The whole document.
     pub fn finish(mut self) -> String {
         self.text += "</svg>\n";
         self.text
     }
 
-    /// Draws a line through the points, unless there are fewer than two.
+    /// Draws a line through at least two points.
     pub fn line(&mut self, points: &[Point], width: f64, colour: Colour) {
         self.polyline(points, width, colour, "");
     }
 
-    /// Draws a broken line through the points.
+    /// Draws a dashed line.
     pub fn dashed_line(&mut self, points: &[Point], width: f64, colour: Colour) {
         self.polyline(points, width, colour, " stroke-dasharray=\"6 5\"");
     }
@@ -146,7 +139,7 @@ impl Svg {
         }
     }
 
-    /// Draws a filled polygon, unless there are fewer than three corners.
+    /// Draws a filled polygon of at least three corners.
     pub fn polygon(&mut self, corners: &[Point], colour: Colour) {
         if corners.len() > 2 {
             let (corners, fill) = (point_list(corners), Fill(colour));
@@ -154,7 +147,6 @@ impl Svg {
         }
     }
 
-    /// Draws a filled rectangle.
     pub fn rectangle(&mut self, rect: Rect, colour: Colour) {
         let [x, y, width, height] = [rect.left, rect.top, rect.width(), rect.height()].map(decimal);
         let fill = Fill(colour);
@@ -163,7 +155,6 @@ impl Svg {
         ));
     }
 
-    /// Draws a filled disc.
     pub fn disc(&mut self, (x, y): Point, radius: f64, colour: Colour) {
         let [x, y, radius] = [x, y, radius].map(decimal);
         let fill = Fill(colour);
@@ -190,7 +181,7 @@ impl Svg {
     }
 }
 
-/// Writes a number with two decimals: a hundredth of a pixel is finer than any screen.
+/// Formats two decimals: a hundredth of a pixel is finer than any screen.
 fn decimal(value: f64) -> String {
     let text = format!("{value:.2}");
     let text = text.trim_end_matches('0').trim_end_matches('.');

@@ -1,9 +1,9 @@
 //! Size of a text, estimated without a font.
 //!
-//! An SVG is shown with the reader's own sans-serif font. The widths here follow the wider of the common ones (DejaVu Sans,
-//! Verdana). So a layout made with them is also valid for the narrower ones (Arial, Noto Sans).
+//! The widths follow the wider common sans-serif fonts (DejaVu Sans, Verdana), so a layout is also
+//! valid for the narrower ones (Arial, Noto Sans).
 
-/// Estimated width in pixels of `text` at a font size of `size` pixels; rather too wide than too narrow.
+/// Upper estimate of the width of `text` in pixels at a font size of `size` pixels.
 pub(crate) fn width(text: &str, size: f64) -> f64 {
     text.chars().map(em).sum::<f64>() * size
 }
@@ -22,7 +22,7 @@ fn em(character: char) -> f64 {
     }
 }
 
-/// `text` itself if it is at most `room` pixels wide, else as much of its beginning as fits, with an ellipsis.
+/// Cuts `text` to `room` pixels, with an ellipsis.
 pub(crate) fn fit(text: &str, size: f64, room: f64) -> String {
     if width(text, size) <= room {
         return text.to_owned();
@@ -38,8 +38,8 @@ pub(crate) fn fit(text: &str, size: f64, room: f64) -> String {
     format!("{}…", kept.trim_end())
 }
 
-/// `text` broken at spaces onto at most `lines` lines of at most `room` pixels; the remainder is cut off
-/// with an ellipsis. No line for an empty text.
+/// Breaks `text` at spaces into at most `lines` lines of `room` pixels, with an ellipsis; no line
+/// for an empty text.
 pub(crate) fn wrap(text: &str, size: f64, room: f64, lines: usize) -> Vec<String> {
     let mut wrapped: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
@@ -60,13 +60,13 @@ pub(crate) fn wrap(text: &str, size: f64, room: f64, lines: usize) -> Vec<String
 pub(crate) struct Rows(Vec<Vec<(f64, f64)>>);
 
 impl Rows {
-    /// The first row that is free between `left` and `right`; a new one if all rows are occupied there.
+    /// Returns the first row that is free between `left` and `right`, or a new one.
     pub fn first_free(&self, left: f64, right: f64) -> usize {
         let free = |row: &Vec<(f64, f64)>| row.iter().all(|&(start, end)| right <= start || end <= left);
         self.0.iter().position(free).unwrap_or(self.0.len())
     }
 
-    /// Occupies the room between `left` and `right` in the first free row, and returns that row.
+    /// Occupies the first free row between `left` and `right`, and returns it.
     pub fn place(&mut self, left: f64, right: f64) -> usize {
         let row = self.first_free(left, right);
         if row == self.0.len() {

@@ -1,4 +1,4 @@
-//! The paper's figures 2 to 6 redrawn over the study's seeds, and two further ones.
+//! Figures 2 to 6 of the paper over the study's seeds, and two further ones.
 
 use maud::html;
 
@@ -31,7 +31,7 @@ const MIDDLE_6: Family =
 const MIDDLE_4: Family =
     Family { name: "middle4", label: "4 in the middle", colour: 3, marker: Marker::Triangle };
 
-/// A figure of an arm, drawn against its number of training positions.
+/// A figure of an arm by number of training positions.
 struct Measure {
     title: &'static str,
     axis: Axis,
@@ -42,7 +42,7 @@ struct Measure {
 
 /// Distance between families, so that their bars do not meet.
 const PITCH: f64 = 1.3;
-/// Distance of a published point from its family's.
+/// Distance of a published point from its family.
 const BESIDE: f64 = 0.5;
 
 impl Paper<'_> {
@@ -145,7 +145,7 @@ impl Paper<'_> {
         error_chart(self.report, title, &lines)
     }
 
-    /// Each family's medians with bars, and the paper's points beside them; `None` if no arm was run.
+    /// Chart of each family's medians with bars, and the paper's points; `None` without an arm.
     fn against_count(&self, measure: &Measure, families: &[Family]) -> Option<Chart> {
         let middle = (families.len() - 1) as f64 / 2.0;
         let families: Vec<(Family, f64)> =
@@ -162,7 +162,7 @@ impl Paper<'_> {
         (!series.is_empty()).then(|| Chart::new(measure.title, x, measure.axis.clone(), series))
     }
 
-    /// A thin line through a family's medians and their bars.
+    /// Thin line through a family's medians and bars.
     fn found(&self, measure: &Measure, family: Family, shift: f64) -> Vec<Series> {
         let points: Vec<ErrorPoint> = COUNTS
             .iter()

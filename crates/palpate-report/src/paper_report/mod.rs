@@ -1,4 +1,4 @@
-//! The report of the founding paper's study, for readers who do not know the paper.
+//! Report of the founding paper's study.
 
 mod figures;
 mod tables;
@@ -17,9 +17,10 @@ use palpate_studies::paper::{Agreement, Claim, PublishedFigure, claims, publishe
 
 const DOI: &str = "https://doi.org/10.5772/53567";
 
-/// Reports the paper's study: `report.html`, one self-contained page, and its figures as SVG files.
+/// Returns `report.html` and its figures as SVG files.
 ///
-/// Figures 2 to 6 and tables 1 to 3 have the paper's numbers. Parts that need an arm without a fit are left out.
+/// Figures 2 to 6 and tables 1 to 3 have the paper's numbers. Parts that need an arm without a fit
+/// are omitted.
 pub fn paper_report(report: &StudyReport) -> Vec<ReportFile> {
     let paper = Paper {
         report,
@@ -32,7 +33,6 @@ pub fn paper_report(report: &StudyReport) -> Vec<ReportFile> {
         .files()
 }
 
-/// The study with its verdicts.
 struct Paper<'a> {
     report: &'a StudyReport<'a>,
     published: Vec<PublishedFigure>,
@@ -140,20 +140,19 @@ impl Paper<'_> {
         }
     }
 
-    /// The published figure of an arm with this key, beside that of the study.
+    /// Published figure of an arm with this key.
     fn published(&self, arm: &str, key: &str) -> Option<&PublishedFigure> {
         let id = format!("{arm}.{key}");
         self.published.iter().find(|figure| figure.id == id)
     }
 
-    /// Rig, beam and force in newtons; `None` for another surface. All arms of the paper share them.
+    /// Rig, beam and force in newtons, which all arms share; `None` for another surface.
     fn setup(&self) -> Option<(&Rig, Beam, f64)> {
         let rig = &self.report.study.study.arms.first()?.rig;
         let SurfaceSpec::Beam(beam) = rig.setup.surface() else { return None };
         Some((rig, *beam, rig.setup.force_n()?))
     }
 
-    /// Distance of neighbouring sensors in mm; `None` if the distances differ.
     fn sensor_pitch_mm(&self) -> Option<String> {
         let (rig, ..) = self.setup()?;
         let positions: Vec<f64> =
@@ -243,7 +242,6 @@ fn bench_in_words(rig: &Rig, beam: Beam, force_n: f64) -> Markup {
     }
 }
 
-/// "deflection", or several names if the sensors differ.
 fn kinds(rig: &Rig) -> String {
     let mut names: Vec<&str> = rig.setup.layout().sensors().iter().map(|sensor| sensor.kind.name()).collect();
     names.dedup();

@@ -1,4 +1,4 @@
-//! The paper's tables 1 to 3 computed again; published against replicated figures; the claims; results that do not replicate; and
+//! Tables of the paper's report: tables 1 to 3, published against replicated figures, claims, and
 //! settings that the paper does not state.
 
 use maud::{Markup, html};
@@ -16,7 +16,7 @@ use palpate_rig::Rig;
 use palpate_studies::PortionResults;
 use palpate_studies::paper::{Claim, ClaimPart, PublishedFigure, Yardstick};
 
-/// Arms with the same training positions.
+/// Arms with equal training positions.
 struct Set<'a> {
     arms: Vec<&'a str>,
     training: &'a Training,
@@ -24,7 +24,7 @@ struct Set<'a> {
 }
 
 impl Paper<'_> {
-    /// The sets of training positions that `keep` accepts, each once.
+    /// Distinct sets of training positions that `keep` accepts.
     fn sets(&self, keep: impl Fn(&Arrangement) -> bool) -> Vec<Set<'_>> {
         let mut sets: Vec<Set> = Vec::new();
         for arm in &self.report.study.study.arms {
@@ -120,7 +120,7 @@ fn even_pitch(positions: &[Position]) -> String {
     }
 }
 
-/// The paper's E1.1 to E3.2: tens of positions, then 1 for six in the middle and 2 for four.
+/// Name in the paper, E1.1 to E3.2: tens of positions, then 1 for six in the middle and 2 for four.
 fn paper_name(count: usize, middle: usize) -> String {
     match (count, middle) {
         (10 | 20 | 30, 6) => format!("E{}.1", count / 10),
@@ -133,7 +133,7 @@ fn paper_name(count: usize, middle: usize) -> String {
 struct EdgeDense<'a> {
     set: &'a Set<'a>,
     middle: usize,
-    /// Positions in each edge.
+    /// Number of positions in each edge.
     edge: usize,
     portion: (f64, f64),
 }
@@ -144,7 +144,7 @@ impl<'a> EdgeDense<'a> {
         Some(Self { set, middle, edge: (set.positions.len() - middle) / 2, portion })
     }
 
-    /// Left edge, middle, right edge.
+    /// Positions of left edge, middle and right edge.
     fn parts(&self) -> [&'a [Position]; 3] {
         let (edge, middle) = (self.edge, self.middle);
         let positions = &self.set.positions;
@@ -267,7 +267,7 @@ impl Paper<'_> {
     }
 }
 
-/// Published value as the paper prints it; a bound with its sign.
+/// Formats a value as in the paper; a bound with its sign.
 fn printed(figure: &PublishedFigure) -> String {
     let sign = if figure.yardstick == Yardstick::Below { "< " } else { "" };
     format!("{sign}{}", as_written(figure.published))
@@ -326,7 +326,7 @@ fn share(share: f64) -> String {
 /// Young's modulus as the paper prints it, in pascals.
 const PRINTED_MODULUS_PA: f64 = 200e6;
 
-/// Statement of the paper about each setting of an estimator, by its key; the keys in the order of the table.
+/// Statement of the paper about each setting of the network, by key, in the order of the table.
 const OF_THE_NETWORK: [(&str, &str); 13] = [
     ("input_scale", "not stated"),
     ("biases", "not stated"),
@@ -372,7 +372,7 @@ impl Paper<'_> {
             .caption(html! { "Settings of this study and of the paper." })
     }
 
-    /// Remark on the deflection with the modulus as printed, unless the study uses that modulus.
+    /// Remark on the deflection with the printed modulus, unless the study uses it.
     fn why_not_the_printed_modulus(&self) -> Markup {
         let Some((_, beam, force_n)) = self.setup() else { return Markup::default() };
         if (beam.youngs_modulus_pa() / PRINTED_MODULUS_PA - 1.0).abs() < 1e-6 {
@@ -393,7 +393,7 @@ impl Paper<'_> {
         }
     }
 
-    /// The setting with this key, with every value that an arm gives it.
+    /// Setting with this key, and its values in all arms.
     fn network_row(&self, key: &str, paper: &str) -> Option<[String; 3]> {
         let arms = self.report.study.study.arms.iter();
         let found: Vec<Setting> = arms

@@ -1,4 +1,4 @@
-//! Properties of the drawing of a beam.
+//! Tests of the drawing of a beam.
 
 use super::{Drawing, see};
 use crate::beam_drawing::BeamDrawing;
@@ -10,7 +10,7 @@ const GREEN: &str = "#009e73";
 const SPRING: BeamSupportKind =
     BeamSupportKind::Elastic { stiffness_n_per_m: 1e3, rotational_stiffness_nm_per_rad: None };
 
-/// A simply supported beam of 400 mm with a half wave as its deflection, deepest in the middle.
+/// A simply supported beam of 400 mm with a half wave as its deflection.
 fn beam(sensors: usize, load_mm: f64, width_px: u32) -> BeamDrawing {
     let length_mm = 400.0;
     let wave = |x: f64| -3.47 * (std::f64::consts::PI * x / length_mm).sin();

@@ -1,4 +1,4 @@
-//! Properties of every chart, also with awkward data.
+//! Tests of charts, also with extreme data.
 
 use super::{Drawing, overlap, see};
 use crate::drawing::layout::Layout;
@@ -199,7 +199,7 @@ fn both_axes_of_every_chart_can_be_read() {
     }
 }
 
-/// Strokes in the colour of the first series, without the sample in the legend.
+/// Strokes in the colour of the first series, without the legend.
 fn pieces(chart: &Chart) -> usize {
     see(&chart_to_svg(chart)).strokes(BLUE).count() - 1
 }

@@ -1,4 +1,4 @@
-//! The report of dead areas has every arm in its figures and tables.
+//! Tests of the report of dead areas.
 
 use crate::dead_areas_report;
 use palpate_numerics::watch::Watch;

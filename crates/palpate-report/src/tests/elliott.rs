@@ -1,4 +1,4 @@
-//! The report of Elliott's chain has every chain in its table, and its figures.
+//! Tests of the report of Elliott's chain.
 
 use crate::elliott_report;
 use palpate_estimators::evaluation::Quantiles;

@@ -1,4 +1,4 @@
-//! Properties of heat maps.
+//! Tests of heat maps.
 
 use super::see;
 use crate::{HeatMap, HeatPanel, heat_map_to_svg};

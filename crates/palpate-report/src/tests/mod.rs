@@ -1,4 +1,4 @@
-//! Properties of the drawings, read back from the SVG by a parser of XML.
+//! Tests of the drawings, parsed as XML.
 
 mod beams;
 mod charts;
@@ -13,16 +13,15 @@ mod pictures;
 use crate::drawing::geometry::Rect;
 use crate::drawing::text;
 
-/// A drawing read back.
 struct Drawing {
     image: Rect,
-    /// Every text and the box of its line, with the estimated width.
+    /// Texts and the boxes of their lines, with the estimated width.
     texts: Vec<(String, Rect)>,
-    /// The box of every line and shape, with its stroke.
+    /// Boxes of lines and shapes, with their strokes.
     shapes: Vec<(Paint, Rect)>,
 }
 
-/// Colours of a line or shape as "#rrggbb".
+/// Colours as "#rrggbb".
 #[derive(Debug, Clone, PartialEq)]
 struct Paint {
     stroke: Option<String>,
@@ -84,14 +83,13 @@ fn points(element: roxmltree::Node) -> Vec<(f64, f64)> {
     element.attribute("points").expect("points").split(' ').map(point).collect()
 }
 
-/// The box of some points, and `margin` around it.
 fn bounding_box(points: &[(f64, f64)], margin: f64) -> Rect {
     let least = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).fold(f64::INFINITY, f64::min) - margin;
     let most = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).fold(f64::NEG_INFINITY, f64::max) + margin;
     Rect { left: least(|at| at.0), right: most(|at| at.0), top: least(|at| at.1), bottom: most(|at| at.1) }
 }
 
-/// Whether two boxes share more than a tenth of a pixel in both directions.
+/// Returns true if two boxes share more than a tenth of a pixel in both directions.
 fn overlap(a: &Rect, b: &Rect) -> bool {
     let across = a.right.min(b.right) - a.left.max(b.left);
     let down = a.bottom.min(b.bottom) - a.top.max(b.top);

@@ -1,4 +1,4 @@
-//! Whole reports: they are complete for a reader and a browser, for any run.
+//! Tests of whole reports.
 
 use std::collections::BTreeSet;
 
@@ -44,14 +44,13 @@ impl Run {
     }
 }
 
-/// The paper's study, cut down to a few epochs.
+/// The paper's study with a few epochs.
 fn quick_paper() -> String {
     let text = paper::STUDY_TOML.replace("max_epochs = 1_000_000", "max_epochs = 50");
     assert!(text.contains("max_epochs = 50"));
     text
 }
 
-/// The paper's bench with other arms.
 fn with_arms(arms: &[(&str, &str)]) -> String {
     let text = quick_paper();
     let (head, _) = text.split_once("[[arm]]").unwrap();
@@ -65,13 +64,12 @@ fn page(files: &[ReportFile]) -> &str {
     std::str::from_utf8(&file.bytes).unwrap()
 }
 
-/// The values of an attribute.
 fn attributes<'a>(html: &'a str, name: &str) -> Vec<&'a str> {
     let start = format!(" {name}=\"");
     html.split(&start).skip(1).filter_map(|rest| rest.split('"').next()).collect()
 }
 
-/// The text between the tags, without styles.
+/// Text between the tags, without styles.
 fn shown_text(html: &str) -> String {
     let body = html.split_once("<body>").unwrap().1;
     body.split('<')
@@ -204,7 +202,7 @@ fn a_study_of_sensors_shows_its_layouts_and_the_limit() {
     assert!(!text.contains("iterations") && !text.contains("did not converge"), "{text}");
 }
 
-/// The rig of the paper, with a network that is trained for a few epochs.
+/// Rig of the paper with a few epochs.
 fn quick_rig(max_epochs: u32) -> Rig {
     let mut rig = Rig::from_toml(include_str!("../../../../examples/paper.toml")).unwrap();
     let Estimator::Network(network) = &mut rig.estimator else { panic!("the paper has a network") };
@@ -263,7 +261,7 @@ fn an_evaluation_of_nothing_has_a_report() {
     assert_sound(&files, 2);
 }
 
-/// The report of the limit of the paper's beam over these sensors, for a known or unknown force.
+/// Report of the limit of the paper's beam with these sensors.
 fn limits(sensors: SensorGroup, force: Force) -> Vec<ReportFile> {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0)).unwrap();
     let setup = Setup::new(beam).sensors(sensors).unwrap();

@@ -1,4 +1,4 @@
-//! Properties of the parts of a chart's layout.
+//! Tests of the layout of a chart.
 
 use crate::Axis;
 use crate::drawing::axis::{AxisScale, Tick, choose_ticks, minor_ticks};

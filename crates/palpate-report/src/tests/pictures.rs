@@ -1,4 +1,4 @@
-//! Figures as PNG, and the sizes of their texts in a font.
+//! Tests of figures as PNG, and of text sizes in a font.
 
 use super::charts::awkward;
 use crate::drawing::svg::{Anchor, INK, Label, Svg};

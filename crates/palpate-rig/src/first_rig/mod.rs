@@ -1,4 +1,4 @@
-//! A first rig for somebody's own recording, its guesses as comments.
+//! First rig for a recording, with guesses as comments.
 
 mod roles;
 
@@ -15,122 +15,121 @@ use crate::error::RigError;
 use crate::rig::Rig;
 use roles::{Left, PositionRole, Roles, name_and_unit, range};
 
-/// Hints about a recording: columns by their headings, with or without units, or by their numbers from 1 where there is
-/// no header.
+/// Columns by heading or by number from 1.
 #[derive(Clone, Debug, Default)]
 pub struct Hints {
-    /// The position along a line.
+    /// Position along a line.
     pub position: Option<String>,
-    /// The position along a plane.
+    /// Position along a plane.
     pub x: Option<String>,
-    /// The position across a plane.
+    /// Position across a plane.
     pub y: Option<String>,
-    /// The force.
+    /// Force.
     pub force: Option<String>,
-    /// The time.
+    /// Time.
     pub time: Option<String>,
-    /// The nuisance coordinate.
+    /// Nuisance coordinate.
     pub nuisance: Option<String>,
-    /// The marks of untouched rows.
+    /// Marks of untouched rows.
     pub untouched: Option<String>,
-    /// The channels; those that are guessed where there are none.
+    /// Channels; guessed if empty.
     pub channels: Vec<String>,
-    /// Separator of the fields.
+    /// Field separator.
     pub separator: Option<Separator>,
     /// Decimal mark.
     pub decimal: Option<Decimal>,
 }
 
-/// Columns of a file that a rig is guessed for, at most: every name is compared with every other.
+/// Limit for a reasonable time: every name is compared with every other.
 const MOST_COLUMNS: usize = 10_000;
 
-/// A recording that no rig can be guessed for.
+/// Reason why no rig can be guessed.
 #[derive(Debug, thiserror::Error)]
 pub enum FirstRigError {
-    /// The file cannot be read.
+    /// Unreadable file.
     #[error(transparent)]
     Csv(#[from] CsvError),
-    /// More columns than roles are sought among.
+    /// Too many columns.
     #[error("the file has {columns} columns; a rig is guessed for at most {MOST_COLUMNS}")]
     TooManyColumns {
-        /// Columns of the file.
+        /// Number of columns.
         columns: usize,
     },
-    /// No column has the name of a position.
+    /// Missing position.
     #[error("no column has the name of a position; the columns are {columns}")]
     NoPosition {
-        /// The columns and their contents.
+        /// Columns and contents.
         columns: String,
     },
-    /// Several columns have the name of a position.
+    /// Ambiguous position.
     #[error("more than one column may be the position: {candidates}")]
     ManyPositions {
-        /// Their headings.
+        /// Headings.
         candidates: String,
     },
-    /// No column is left for a channel.
+    /// Missing channel.
     #[error(
         "no column is left that may be a channel: a channel has a number in every row, and not always the same; the columns are {columns}"
     )]
     NoChannels {
-        /// The columns and their contents.
+        /// Columns and contents.
         columns: String,
     },
-    /// A hint names a column that is not there, or not the only one.
+    /// Hint without a unique column.
     #[error("{flag}: column `{name}` is missing or not unique; the columns are {columns}")]
     NoSuchColumn {
-        /// The flag of the hint.
+        /// Flag of the hint.
         flag: &'static str,
-        /// The name.
+        /// Name.
         name: String,
-        /// The columns and their contents.
+        /// Columns and contents.
         columns: String,
     },
-    /// A hint names a column with words in it.
+    /// Hint of a column with text.
     #[error("{flag}: column `{column}` has `{text}` on line {line}; every row must have a number")]
     NotNumbers {
-        /// The flag of the hint.
+        /// Flag of the hint.
         flag: &'static str,
-        /// The heading.
+        /// Heading.
         column: String,
-        /// The first field that is not a number.
+        /// First text.
         text: String,
         /// Line.
         line: usize,
     },
-    /// A hint names a column that marks no rows.
+    /// Hint of a column without marks.
     #[error("--untouched: every row of column `{column}` must be 1, true or yes, or 0, false, no or empty")]
     NotMarks {
-        /// The heading.
+        /// Heading.
         column: String,
     },
-    /// A hint names a column without numbers.
+    /// Hint of a column without numbers.
     #[error("{flag}: column `{column}` has no numbers")]
     NoNumbers {
-        /// The flag of the hint.
+        /// Flag of the hint.
         flag: &'static str,
-        /// The heading.
+        /// Heading.
         column: String,
     },
-    /// All presses are at one place.
+    /// Presses at one position.
     #[error("column `{column}` is {value} in every row; a rig needs presses at 2 positions or more")]
     OnePosition {
-        /// The heading of the position.
+        /// Heading of the position.
         column: String,
         /// Value.
         value: f64,
     },
-    /// The heading of a column says a unit in which its role is not read.
+    /// Unit of another quantity.
     #[error("column `{column}` is in `{unit}`; {} is one of {}", wanted.noun(), symbols(*wanted))]
     ForeignUnit {
-        /// The heading.
+        /// Heading.
         column: String,
         /// Unit.
         unit: String,
-        /// Quantity that the column should measure.
+        /// Expected quantity.
         wanted: Dimension,
     },
-    /// The rig that was guessed cannot be used.
+    /// Invalid guessed rig.
     #[error("the rig that was guessed from the file cannot be used: {0}")]
     Refused(RigError),
 }
@@ -140,7 +139,7 @@ fn symbols(dimension: Dimension) -> String {
 }
 
 impl FirstRigError {
-    /// The flags of `palpate init` that say what could not be guessed.
+    /// Flags of `palpate init` that resolve the error.
     pub fn help(&self) -> Option<&'static str> {
         match self {
             Self::NoPosition { .. } | Self::ManyPositions { .. } => Some(
@@ -167,7 +166,7 @@ impl FirstRigError {
     }
 }
 
-/// A rig that was guessed from a recording.
+/// Rig guessed from a recording.
 ///
 /// ```
 /// use palpate_rig::{FirstRig, Hints, Rig};
@@ -185,18 +184,16 @@ pub struct FirstRig {
     table: Table,
     hints: Hints,
     roles: Roles,
-    /// Start and end of the surface by coordinate, and those of the presses.
     sides: Vec<Side>,
-    /// Forces that are 0 but for noise, where there are any.
     zero_force: Option<ZeroForce>,
     warnings: Vec<String>,
 }
 
 impl FirstRig {
-    /// The rig of a recording; `source` is the name of its file.
+    /// Guesses a rig; `source` is the file name.
     ///
     /// # Errors
-    /// [`FirstRigError`] for a file that cannot be read, and for one of which the columns cannot be told.
+    /// [`FirstRigError`] for an unreadable file or unclear columns.
     pub fn guess(source: &str, bytes: &[u8], hints: &Hints) -> Result<Self, FirstRigError> {
         let table = Table::read(source, bytes, hints.separator, hints.decimal)?;
         let columns = table.columns.len();
@@ -222,24 +219,23 @@ impl FirstRig {
         let recording = rig.setup.read_recording(source, bytes)?;
         first.zero_force = recording.provenance.dialects.iter().find_map(|dialect| dialect.zero_force);
         if first.zero_force.is_some() {
-            // Rows without contact may be anywhere, also beside the surface.
+            // Untouched rows can have any position, also off the surface.
             first.sides = first.sides()?;
         }
         first.warnings = first.looked_at(&recording);
         Ok(first)
     }
 
-    /// The sides of a surface that holds the presses, one a coordinate.
     fn sides(&self) -> Result<Vec<Side>, FirstRigError> {
         self.roles.position.columns().into_iter().map(|column| self.side(column)).collect()
     }
 
-    /// Warnings for the bench's owner.
+    /// Warnings for the owner of the bench.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
-    /// Roles of the columns, in one line.
+    /// Roles of the columns in one line.
     pub fn summary(&self) -> String {
         let name = |column: usize| format!("`{}`", self.table.columns[column].heading);
         let position: Vec<String> = self.roles.position.columns().into_iter().map(name).collect();
@@ -263,7 +259,7 @@ impl FirstRig {
         words.join(", ")
     }
 
-    /// The commands to type next, where the rig is in the file `rig`.
+    /// Next commands for the file `rig`.
     pub fn next_commands(&self, rig: &str) -> [String; 3] {
         let [rig, data] = [rig, &self.source].map(shell_word);
         [
@@ -273,7 +269,7 @@ impl FirstRig {
         ]
     }
 
-    /// The rig file; `name` is the name that it will have.
+    /// Formats the rig file under `name`.
     pub fn to_toml(&self, name: &str) -> String {
         let mut toml = Toml::default();
         let rows = self.table.rows;
@@ -398,7 +394,7 @@ impl FirstRig {
         toml.line(&format!("{key} = \"{unit}\""), comment);
     }
 
-    /// The column as a rig names it: without its unit where that is clear, by its number where its heading is not its own.
+    /// Column in a rig: without a clear unit, by number if its heading is not unique.
     fn key(&self, column: usize) -> String {
         let heading = &self.table.columns[column].heading;
         if self.table.header == Header::Absent {
@@ -449,7 +445,6 @@ impl FirstRig {
         format!("`{heading}`: {reason}.")
     }
 
-    /// The unit of a column, refused where it is another quantity's.
     fn unit(&self, column: usize, wanted: Dimension) -> Result<Unit, FirstRigError> {
         let TableColumn { heading, .. } = &self.table.columns[column];
         let foreign = |unit: &str| FirstRigError::ForeignUnit {
@@ -465,7 +460,6 @@ impl FirstRig {
         }
     }
 
-    /// The stretch of a coordinate that the presses cover, and a surface's that holds it.
     fn side(&self, column: usize) -> Result<Side, FirstRigError> {
         let unit = self.unit(column, Dimension::Length)?;
         let heading = &self.table.columns[column].heading;
@@ -481,7 +475,6 @@ impl FirstRig {
         Ok(Side::around(metres(low), metres(high)))
     }
 
-    /// The numbers of a column in rows that are not untouched, where there are any.
     fn pressed(&self, column: usize) -> Vec<f64> {
         let numbers = self.table.columns[column].numbers().unwrap_or_default();
         let forces = self.roles.force.and_then(|force| self.table.columns[force].numbers());
@@ -537,7 +530,7 @@ impl FirstRig {
         warnings
     }
 
-    /// Warnings of headings that several columns have, exactly or but for case and blanks.
+    /// Warns of equal headings, up to case and blanks.
     fn warnings_of_headings(&self) -> Vec<String> {
         if self.table.header == Header::Absent {
             return Vec::new();
@@ -593,12 +586,10 @@ impl FirstRig {
     }
 }
 
-/// The unit that a heading says.
 fn own_unit(column: &TableColumn) -> Option<Unit> {
     name_and_unit(Heading::parse(&column.heading)).1
 }
 
-/// The unit that numbers of a dimension are in where nothing is said.
 fn usual_unit(dimension: Dimension) -> Unit {
     let symbol = match dimension {
         Dimension::Length => "mm",
@@ -608,20 +599,15 @@ fn usual_unit(dimension: Dimension) -> Unit {
     Unit::from_symbol(symbol).unwrap_or(Unit::NONE)
 }
 
-/// One coordinate of a surface around its presses.
 #[derive(Clone, Debug, PartialEq)]
 struct Side {
-    /// The file's coordinate of the surface's start, as a rig says it.
     origin: String,
-    /// The surface's length or width, as a rig says it.
     size: String,
-    /// The first and the last press.
     pressed_m: (f64, f64),
 }
 
 impl Side {
-    /// A surface that begins at 0 where presses lie on the one side of it not far away, and ends as far beyond the last of them as the
-    /// first is from its start, at the next round number.
+    /// Creates a side from 0 if the presses begin near it, with equal margins and round numbers.
     fn around(low_m: f64, high_m: f64) -> Self {
         let span_m = high_m - low_m;
         let (digit, exponent) = round_step(span_m / 20.0);
@@ -640,7 +626,7 @@ impl Side {
     }
 }
 
-/// 1, 2 or 5 and a power of ten: the least such number that is no smaller than `value`.
+/// Returns the least of 1, 2 or 5 times a power of ten that is at least `value`.
 fn round_step(value: f64) -> (i64, i32) {
     let exponent = value.log10().floor();
     let mantissa = value / 10f64.powf(exponent);
@@ -653,7 +639,6 @@ fn decimal(digits: i64, exponent: i32) -> f64 {
     format!("{digits}e{exponent}").parse().unwrap_or(f64::NAN)
 }
 
-/// The text of a rig, with comments in a column.
 #[derive(Default)]
 struct Toml {
     text: String,
@@ -678,12 +663,10 @@ impl Toml {
     }
 }
 
-/// A text without the characters that a comment cannot hold.
 fn printable(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { '?' } else { c }).collect()
 }
 
-/// A text as TOML writes it.
 fn quoted(text: &str) -> String {
     let mut quoted = String::from("\"");
     for c in text.chars() {
@@ -699,7 +682,7 @@ fn quoted(text: &str) -> String {
     quoted
 }
 
-/// A file's name as a shell takes it.
+/// Quotes a file name for a shell.
 pub fn shell_word(name: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "._-/\\:".contains(c);
     if !name.is_empty() && name.chars().all(plain) { name.to_owned() } else { format!("\"{name}\"") }

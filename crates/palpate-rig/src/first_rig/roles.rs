@@ -1,11 +1,10 @@
-//! Guesses the roles of a table's columns, by names in English and German, by units, and by the columns' contents.
+//! Roles of columns, guessed by English and German names, units and contents.
 
 use palpate_estimators::recording::{Content, Header, Heading, Table};
 use palpate_mechanics::units::{Dimension, Unit};
 
 use super::{FirstRigError, Hints};
 
-/// Names of a position along a surface.
 const PLACE: &[&str] = &[
     "position",
     "pos",
@@ -24,7 +23,7 @@ const PLACE: &[&str] = &[
     "druckstelle",
     "kontaktposition",
 ];
-/// Names of a position, if no column has a better one.
+/// Names of a position if no column has a better one.
 const DISTANCE: &[&str] = &["distance", "abstand", "weg", "strecke"];
 const FORCE: &[&str] = &[
     "force",
@@ -56,7 +55,7 @@ const TIME: &[&str] = &[
     "seconds",
     "sekunden",
 ];
-/// Names of a column that marks untouched rows, their words joined.
+/// Names of a column that marks untouched rows, with joined words.
 const UNTOUCHED: &[&str] = &[
     "untouched",
     "nottouched",
@@ -80,12 +79,12 @@ const UNTOUCHED: &[&str] = &[
     "nullpunkt",
     "nulllinie",
 ];
-/// Words that may accompany another name and have no meaning of their own here.
+/// Words without a meaning of their own.
 const FILLERS: &[&str] = &[
     "true", "actual", "measured", "ist", "soll", "contact", "kontakt", "press", "applied", "normal", "axis",
     "achse", "achsen", "richtung", "der", "des", "of", "the", "und", "and", "in", "am", "z",
 ];
-/// Names of columns that number rows.
+/// Row counters.
 const COUNTERS: &[&str] = &[
     "nr",
     "no",
@@ -122,7 +121,7 @@ const COUNTERS: &[&str] = &[
     "step",
     "schritt",
 ];
-/// Names of other properties of a press.
+/// Other properties of a press.
 const CIRCUMSTANCES: &[&str] = &[
     "depth",
     "tiefe",
@@ -150,19 +149,15 @@ const CIRCUMSTANCES: &[&str] = &[
     "höhe",
 ];
 
-/// Roles of the columns of a table, by their indices.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Roles {
     pub position: PositionRole,
     pub force: Option<usize>,
-    /// Candidates for the force, if there are several.
     pub many_forces: Vec<usize>,
     pub time: Option<usize>,
     pub nuisance: Option<usize>,
-    /// The column that marks untouched rows.
     pub untouched: Option<usize>,
     pub channels: Vec<usize>,
-    /// The columns without a role, with the reasons.
     pub left: Vec<(usize, Left)>,
 }
 
@@ -172,42 +167,37 @@ pub(super) enum PositionRole {
     Plane(usize, usize),
 }
 
-/// The reason that a column has no role.
+/// Reason why a column has no role.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Left {
     Empty,
-    /// No field is a number.
     Words,
-    /// A field is not a number.
     Word {
         line: usize,
         text: String,
     },
-    /// A field is empty.
     Gap {
         line: usize,
     },
-    /// The column has no heading of its own.
     Unnamed,
-    /// A circumstance with one value in every row.
+    /// Constant property of the press.
     Constant(f64),
-    /// A channel with one value in every row.
+    /// Constant channel.
     Dead(f64),
     Counter,
-    /// Another property of the press.
+    /// Other property of the press.
     Circumstance,
-    /// Not one of a numbered series of channels.
+    /// Outside the numbered series of channels.
     Single,
-    /// Another column has the role that the name suggests.
+    /// Another column has the suggested role.
     Second,
-    /// Other columns may be the force as well.
+    /// Other columns can be the force.
     OneOfForces,
-    /// In a unit that the suggested role does not have.
+    /// Unit that does not suit the role.
     Unit(String),
 }
 
 impl PositionRole {
-    /// One column or two.
     pub fn columns(self) -> Vec<usize> {
         match self {
             Self::Along(x) => vec![x],
@@ -217,10 +207,7 @@ impl PositionRole {
 }
 
 impl Roles {
-    /// The roles in the hints, and the most likely others.
-    ///
-    /// # Errors
-    /// [`FirstRigError`] without a unique position, without a channel, or for a hint that matches no column.
+    /// Assigns hinted roles, then the likeliest others.
     pub fn guess(table: &Table, hints: &Hints) -> Result<Self, FirstRigError> {
         let names: Vec<Name> = (0..table.columns.len()).map(|i| Name::new(table, i)).collect();
         let guess = Guess { table, names: &names };
@@ -258,7 +245,6 @@ impl Roles {
     }
 }
 
-/// The columns of the hints.
 struct Told {
     position: Option<PositionRole>,
     force: Option<usize>,
@@ -305,7 +291,6 @@ impl Told {
     }
 }
 
-/// The column with this heading, with this name apart from the unit, or with this number from 1.
 fn find(table: &Table, flag: &'static str, name: &str) -> Result<usize, FirstRigError> {
     let name = name.trim();
     let exact = |heading: &str| heading == name;
@@ -337,7 +322,6 @@ fn checked(table: &Table, flag: &'static str, column: usize) -> Result<usize, Fi
     }
 }
 
-/// Columns with their contents, in words: all, or the first hundred.
 pub(super) fn described(table: &Table) -> String {
     const MOST: usize = 100;
     let words = table.columns.iter().take(MOST).map(|column| {
@@ -359,22 +343,19 @@ pub(super) fn described(table: &Table) -> String {
     words.chain(more).collect::<Vec<_>>().join(", ")
 }
 
-/// The least and the greatest of some numbers.
 pub(super) fn range(numbers: &[f64]) -> (f64, f64) {
     let low = numbers.iter().copied().fold(f64::INFINITY, f64::min);
     (low, numbers.iter().copied().fold(f64::NEG_INFINITY, f64::max))
 }
 
-/// The parts of a heading.
 struct Name {
-    /// Words in small letters, without the unit.
+    /// Lowercase words without the unit.
     words: Vec<String>,
-    /// Heading without the number at its end, and whether there is one.
+    /// Heading without its final number, if any.
     stem: (String, bool),
     unit: Option<Unit>,
-    /// Text in the place of the unit that is not a known unit.
+    /// Unknown unit.
     foreign_unit: Option<String>,
-    /// Whether the column has a heading.
     has_heading: bool,
 }
 
@@ -395,20 +376,18 @@ impl Name {
         }
     }
 
-    /// Whether some word is among `names`, and all others are fillers or in the lists `beside`.
+    /// True if a word is among `names` and the others are fillers or in `beside`.
     fn is(&self, names: &[&str], beside: &[&[&str]]) -> bool {
         let among = |word: &String, lists: &[&[&str]]| lists.iter().any(|list| list.contains(&word.as_str()));
         let others = |word: &String| among(word, &[names, FILLERS]) || among(word, beside);
         self.words.iter().any(|word| names.contains(&word.as_str())) && self.words.iter().all(others)
     }
 
-    /// True for a name of a column that marks untouched rows.
     fn is_of_untouched(&self) -> bool {
         let words: Vec<&str> = self.words.iter().map(String::as_str).filter(|word| *word != "is").collect();
         UNTOUCHED.contains(&words.concat().as_str())
     }
 
-    /// Whether the values can be read in this dimension.
     fn measures(&self, dimension: Dimension) -> bool {
         match (&self.unit, &self.foreign_unit) {
             (Some(unit), _) => unit.dimension() == dimension,
@@ -423,7 +402,6 @@ struct Guess<'a> {
 }
 
 impl Guess<'_> {
-    /// The free columns that have a heading and a name that satisfies `fit`.
     fn columns(&self, taken: &[usize], fit: impl Fn(&Name) -> bool) -> Vec<usize> {
         let free = (0..self.names.len()).filter(|i| !taken.contains(i) && self.names[*i].has_heading);
         free.filter(|i| fit(&self.names[*i])).collect()
@@ -440,7 +418,7 @@ impl Guess<'_> {
         self.numbers(column).map(range).is_some_and(|(low, high)| low < high)
     }
 
-    /// The column that has the name of a mark, with a mark in some rows and none in others.
+    /// Finds a column with a suitable name and both marked and unmarked rows.
     fn untouched(&self, told: &Told) -> Option<usize> {
         let taken: Vec<usize> = [told.force, told.time, told.nuisance].into_iter().flatten().collect();
         let taken = [taken.as_slice(), told.channels.as_slice()].concat();
@@ -452,7 +430,7 @@ impl Guess<'_> {
         named.into_iter().find(marks)
     }
 
-    /// Columns that have a number in every row, and at least two different ones. If there are none, columns with gaps qualify too.
+    /// Columns with a number in every row (else with gaps), not constant.
     fn places(&self, columns: Vec<usize>) -> Vec<usize> {
         let (full, gaps): (Vec<usize>, Vec<usize>) =
             columns.into_iter().partition(|i| self.numbers(*i).is_some());
@@ -497,8 +475,6 @@ impl Guess<'_> {
         }
     }
 
-    /// The reason that no column is the position. The column with the name of a position has a unit that is not a length, contains other
-    /// text than numbers, or has one number in every row.
     fn no_position(&self, taken: &[usize]) -> FirstRigError {
         let place = |name: &Name| name.is(PLACE, &[]) || name.is(&["x", "y"], &[PLACE]);
         let Some(named) = self.columns(taken, place).first().copied() else {
@@ -517,7 +493,7 @@ impl Guess<'_> {
         }
     }
 
-    /// Candidates for the force; rows without one must be marked as untouched, or have no position either.
+    /// Candidates for the force; rows without one must be untouched or have no position.
     fn forces(&self, taken: &[usize], position: PositionRole, untouched: Option<usize>) -> Vec<usize> {
         let places: Vec<_> =
             position.columns().into_iter().map(|i| self.table.columns[i].numbers()).collect();
@@ -549,7 +525,7 @@ impl Guess<'_> {
         stamps.or_else(|| named().into_iter().find(|i| self.numbers(*i).is_some()))
     }
 
-    /// The columns of numbers that vary and have no other name; if some of them form a numbered series, only those.
+    /// Varying columns without another name; only a numbered series, if any.
     fn channels(&self, taken: &[usize]) -> Vec<usize> {
         let mut columns = self.columns(taken, |name| !is_no_channel(name));
         columns.retain(|i| self.varies(*i) && !self.counts(*i));
@@ -567,7 +543,7 @@ impl Guess<'_> {
         families
     }
 
-    /// Whether the column contains at least 10 consecutive whole numbers, as a counter does and a channel does not.
+    /// True for at least 10 consecutive whole numbers.
     fn counts(&self, column: usize) -> bool {
         self.numbers(column).is_some_and(|numbers| {
             numbers.len() >= 10
@@ -576,12 +552,11 @@ impl Guess<'_> {
         })
     }
 
-    /// Whether another column has the same name apart from the number at its end.
+    /// True if another column differs only in its final number.
     fn in_family(&self, name: &Name) -> bool {
         name.stem.1 && self.names.iter().filter(|other| other.stem == name.stem).count() > 1
     }
 
-    /// Reason why a column has no role.
     fn reason(&self, column: usize, has_force: bool) -> Left {
         let name = &self.names[column];
         let foreign = |name: &Name| {
@@ -618,7 +593,6 @@ impl Guess<'_> {
     }
 }
 
-/// The name and the unit in a heading; the unit may also stand as in `position_mm`.
 pub(super) fn name_and_unit(heading: Heading<'_>) -> (&str, Option<Unit>) {
     match suffixed(heading.name).filter(|_| heading.unit.is_none()) {
         Some((name, unit)) => (name, Some(unit)),
@@ -626,20 +600,18 @@ pub(super) fn name_and_unit(heading: Heading<'_>) -> (&str, Option<Unit>) {
     }
 }
 
-/// The parts of a name that ends in a unit, as palpate itself writes them: `position_mm`, `force_n`.
+/// Parts of palpate's own headings: `position_mm`, `force_n`.
 fn suffixed(name: &str) -> Option<(&str, Unit)> {
     let (name, unit) = name.rsplit_once('_').filter(|(name, _)| !name.is_empty())?;
     let unit = Unit::from_symbol(if unit == "n" { "N" } else { unit })?;
     (unit != Unit::NONE).then_some((name, unit))
 }
 
-/// Whether the name is that of something else than a channel.
 fn is_no_channel(name: &Name) -> bool {
     let others = [COUNTERS, CIRCUMSTANCES, TIME, PLACE, FORCE].iter().any(|names| name.is(names, &[]));
     others || name.is(&["x", "y"], &[PLACE]) || name.is_of_untouched()
 }
 
-/// Whether another column has the unit of this one, as sensors of one kind do.
 fn columns_agree(names: &[Name], column: usize) -> bool {
     let same = |other: &&Name| other.unit == names[column].unit;
     names.iter().filter(same).count() > 1

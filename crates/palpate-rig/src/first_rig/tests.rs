@@ -1,6 +1,6 @@
 use super::*;
 
-/// Thirty presses of a line, five times at six places. `heading` gives the columns, and `row` the fields by place, force and number.
+/// Thirty presses of a line, five times at six places; `row` formats place, force and number.
 fn presses(heading: &str, row: impl Fn(f64, f64, usize) -> String) -> String {
     let rows = (0..30).map(|i| row(20.0 * (i % 6) as f64 + 10.0, 1.0 + (i % 4) as f64, i) + "\n");
     format!("{heading}\n{}", rows.collect::<String>())
@@ -10,7 +10,7 @@ fn guess(text: &str, hints: &Hints) -> Result<FirstRig, FirstRigError> {
     FirstRig::guess("presses.csv", text.as_bytes(), hints)
 }
 
-/// The guessed rig, read back; the guess includes reading the recording with it.
+/// Reads the guessed rig.
 fn rig(text: &str) -> Rig {
     Rig::from_toml(&guess(text, &Hints::default()).unwrap().to_toml("rig.toml")).unwrap()
 }
@@ -180,7 +180,7 @@ fn very_many_columns_are_refused_and_not_all_listed() {
     assert!(listed.ends_with("`c99` (1 to 1), and 50 more"), "{listed}");
 }
 
-/// The messages about a recording of four channels below a heading, and the roles of its columns.
+/// Messages and roles for a recording of four channels below a heading.
 fn said_of_heading(heading: &str) -> String {
     let text = presses(heading, |x, force, i| {
         let noise = ((i * 7919) % 13) as f64 / 13.0;

@@ -2,7 +2,6 @@
 
 use super::*;
 
-/// The flexible digit's bench.
 const DIGIT: &str = include_str!("../../../../examples/digit.toml");
 
 #[test]

@@ -1,7 +1,6 @@
 use super::*;
 use palpate_estimators::imperfections::{Amount, Imperfections, OffsetDrift, Relaxation, Schedule};
 
-/// The paper's rig with these imperfections.
 fn imperfect_rig(keys: &str) -> String {
     format!("{PAPER}\n[imperfections]\n{keys}\n")
 }

@@ -1,4 +1,4 @@
-//! Forces of contacts, and distributed loads: `[contact]`, `[[load]]`.
+//! Forces of contacts and distributed loads.
 
 use super::*;
 

@@ -1,10 +1,9 @@
-//! Two coordinates: pairs, grids, and the errors for keys of lines on planes.
+//! Keys of planes.
 
 use super::*;
 use palpate_estimators::arrangement::Arrangement;
 use palpate_mechanics::contact::Position;
 
-/// A plane on which everything can be changed.
 const PLANE: &str = r#"[surface]
 kind = "measured"
 length = "300 mm"

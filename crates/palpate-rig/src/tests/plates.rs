@@ -1,4 +1,4 @@
-//! Plates: edges, supports at points, and the errors for invalid ones.
+//! Plates: edges and supports.
 
 use super::*;
 use palpate_estimators::simulate::clean_reading;
@@ -7,7 +7,6 @@ use palpate_mechanics::surface::plate::{Edge, Edges, PlateSpec, PointSupport, Po
 
 const EXAMPLE: &str = include_str!("../../../../examples/plate.toml");
 
-/// A plate on which everything can be changed.
 const PLATE: &str = r#"[surface]
 kind = "plate"
 length = "300 mm"

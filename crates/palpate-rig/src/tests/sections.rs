@@ -1,7 +1,6 @@
 use super::*;
 use std::path::Path;
 
-/// Only the sections of a rig that `wanted` names.
 fn only(rig: &str, wanted: &[&str]) -> String {
     let mut kept = false;
     let lines = rig.lines().filter(|line| {
@@ -14,7 +13,6 @@ fn only(rig: &str, wanted: &[&str]) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// The text of every example.
 fn examples() -> Vec<String> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
     let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());

@@ -1,4 +1,4 @@
-//! Compares a small study in many parts, in any order, with a whole run of it; and checks every reason to refuse parts.
+//! Compares assembled studies with whole runs, and tests all errors.
 
 use super::*;
 use crate::run::RunOptions;
@@ -49,9 +49,8 @@ const SMALL: &str = r#"
     estimator = { kind = "centroid" }
 "#;
 
-/// Number of seeds that is not a multiple of the lanes.
+/// Not a multiple of the lanes.
 const SEEDS: u64 = 11;
-/// Arms of [`SMALL`].
 const ARMS: usize = 5;
 
 fn prepare(text: &str) -> PreparedStudy {
@@ -62,7 +61,7 @@ static STUDY: LazyLock<PreparedStudy> = LazyLock::new(|| prepare(SMALL));
 static WHOLE: LazyLock<Vec<ArmOutcome>> = LazyLock::new(|| {
     STUDY.run(RunOptions { seeds: SEEDS, threads: 2 }, Vec::new(), &|_| {}, Watch::NONE).unwrap()
 });
-/// The rows of every task, in blocks of a few seeds, last task first.
+/// Rows of all tasks in reverse order.
 static ROWS: LazyLock<FitRows> = LazyLock::new(|| in_blocks(3));
 
 fn in_blocks(block: u64) -> FitRows {
@@ -73,7 +72,6 @@ fn in_blocks(block: u64) -> FitRows {
     rows
 }
 
-/// Tables of all shards, each made by `threads` threads.
 fn shards(of: u64, threads: usize) -> Vec<ShardTables> {
     (1..=of).map(|number| shard(Shard::new(number, of).unwrap(), SEEDS, threads)).collect()
 }

@@ -1,4 +1,4 @@
-//! An array's centroid has dead areas if the range of its sensors is too small; the influence estimator has none.
+//! Dead areas of a centroid and of the influence estimator.
 
 use super::*;
 use palpate_estimators::evaluation::{Evaluation, Located};

@@ -1,4 +1,4 @@
-//! Karhunen–Loève reduction of readings: their principal components.
+//! Karhunen–Loève reduction of readings.
 
 use ndarray::{Array1, Array2};
 
@@ -10,23 +10,21 @@ use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::ResponseGradient;
 use palpate_numerics::symmetric_eigen;
 
-/// The components of a recording's readings: d is a reading less the mean m, each channel over its noise, and
-/// Σ d·dᵀ = V·Λ·Vᵀ over the rows. The components of a reading are Vᵀ·d, those of the largest variance first. With this whitening,
-/// every component has independent noise of variance 1.
+/// Components Vᵀ·d of whitened readings d less their mean, with Σ d·dᵀ = V·Λ·Vᵀ and independent noise of
+/// variance 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KarhunenLoeve {
-    /// m, in the unit of each channel.
+    /// m, in channel units.
     mean: Array1<f64>,
-    /// One over the standard deviation of each channel's noise.
     inverse_sd: Array1<f64>,
-    /// V, with a component in each column.
+    /// V, one component per column.
     components: Array2<f64>,
-    /// Λ over the rows: the variance of each component, in noise variances.
+    /// Λ over the number of rows, in noise variances; descending.
     variances: Vec<f64>,
 }
 
 impl KarhunenLoeve {
-    /// The components of a recording with at least one row; `noise_sd` are the standard deviations of the channels' noise.
+    /// Computes the components of a recording with at least one row.
     pub fn new(recording: &Recording, noise_sd: &[f64]) -> Self {
         let (rows, channels) = (recording.rows.len(), recording.channels.len());
         let at = |(row, channel): (usize, usize)| recording.rows[row].reading[channel];
@@ -39,13 +37,13 @@ impl KarhunenLoeve {
         Self { mean, inverse_sd, components, variances }
     }
 
-    /// The share of all variance that each component carries, in %.
+    /// Share of the variance of each component, %.
     pub fn variance_percent(&self) -> Vec<f64> {
         let all: f64 = self.variances.iter().sum();
         self.variances.iter().map(|variance| 100.0 * variance / all).collect()
     }
 
-    /// The first `count` components of every reading, as raw channels.
+    /// Returns the first `count` components of every reading.
     pub fn reduced(&self, recording: &Recording, count: usize) -> Recording {
         let row = |row: &Row| {
             let reading: Array1<f64> = row.reading.iter().copied().collect();
@@ -63,8 +61,7 @@ impl KarhunenLoeve {
         }
     }
 
-    /// Cramér–Rao bound for estimators that use the first `count` components, at a contact with these derivatives of the readings;
-    /// `None` if the components do not determine the position. The force is known.
+    /// Cramér–Rao bound of the first `count` components at known force; `None` for an undetermined position.
     pub fn bound(&self, gradients: &[ResponseGradient], count: usize) -> Option<Bound> {
         let by = |k: usize| -> Array1<f64> {
             let slopes: Array1<f64> = gradients.iter().map(|gradient| gradient.position[k]).collect();
@@ -79,12 +76,10 @@ impl KarhunenLoeve {
     }
 }
 
-/// Channels without a model, one for each component.
 pub(super) fn raw_layout(count: usize) -> Layout {
     Layout::even(SensorKind::Raw, count, 0.0)
 }
 
-/// A setup without a model, for readings that are components: the surface's extent and the force are known.
 pub(super) fn without_model(setup: &Setup, layout: Layout) -> Result<Setup, SimulateError> {
     Ok(Setup::new(setup.surface().extent()).with_layout(layout)?.with_force(setup.force_n())?)
 }

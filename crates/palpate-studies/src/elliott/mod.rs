@@ -1,9 +1,7 @@
-//! The chain of Elliott and others for a load that moves over a plate: readings of a grid of sensors, their Karhunen–Loève
-//! reduction, and a back-propagation network on the components. It is compared with the influence locator and its tracker on the
-//! same readings, and with the limit.
+//! Elliott's chain for a load on a plate: a sensor grid, Karhunen–Loève reduction, and a back-propagation
+//! network.
 //!
-//! The chain is calibrated by the presses of a rig and judged in two ways. First, by one press at each of some 400 places all over
-//! the plate; those within its inner 90 % count. Second, by the readings of a load that moves as in the rig's `[motion]`.
+//! References are the influence locator, its tracker and the limit.
 
 mod karhunen_loeve;
 
@@ -27,51 +25,50 @@ use palpate_mechanics::surface::{Extent, ResponseGradient};
 use palpate_numerics::watch::Watch;
 use palpate_rig::{Rig, RigSimulationError};
 
-/// The bench of the study, as a rig.
+/// Rig of the study.
 pub const RIG_TOML: &str = include_str!("elliott.toml");
 /// Numbers of components of the study.
 pub const COMPONENTS: [usize; 9] = [2, 3, 4, 5, 6, 8, 10, 15, 25];
-/// Presentations after which a network of the study stops: its readings are noisy, so its error does not become 0.
+/// Limit of presentations; noise prevents an error of 0.
 pub const PRESENTATIONS: u32 = 3_000_000;
-/// Nodes of the network's hidden layer.
 const HIDDEN: usize = 12;
-/// Step along the gradient; noisy readings need a smaller one than the founding paper's.
+/// Noisy readings need a smaller rate than the founding paper's.
 const LEARNING_RATE: f64 = 0.1;
-/// Offset of the moving load's seed from that of its calibration, so that their noise differs.
+/// Seed offset of the moving load, for independent noise.
 const OTHER_NOISE: u64 = 1 << 32;
-/// Share of length and width, about the middle, within which contacts are judged.
+/// Inner share of the plate in the evaluation.
 pub const INNER: f64 = 0.9;
 
 /// Settings of the study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Elliott {
-    /// Plate, sensors, known force, training positions and motion; the sensors have noise and no other errors.
+    /// Rig with a plate, a known force and a motion; sensors have only noise.
     pub rig: Rig,
-    /// Numbers of components that are inputs of a network, one after the other; at most as many as there are sensors.
+    /// Numbers of components; at most the number of sensors.
     pub components: Vec<usize>,
-    /// Presentations after which a network stops.
+    /// Limit of presentations of a network.
     pub presentations: u32,
-    /// Calibrations, each with noise and networks of its own; at least 1.
+    /// Calibrations, each with fresh noise and networks; at least 1.
     pub calibrations: u64,
-    /// Largest error in metres that counts for the effective area.
+    /// Tolerance of the effective area, m.
     pub tolerance_m: f64,
     /// Seed of noise and networks.
     pub seed: u64,
 }
 
-/// A method of locating contacts from readings.
+/// Method of location.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Chain {
-    /// A network with this number of components as inputs.
+    /// Network on this number of components.
     Components(usize),
-    /// A network with the readings themselves as inputs.
+    /// Network on the readings.
     Readings,
-    /// The influence locator, reading by reading.
+    /// Influence locator, reading by reading.
     Influence,
-    /// The influence locator's tracker, with the readings up to each time.
+    /// Tracker on the readings up to each time.
     Filter,
-    /// The influence locator's smoother, with all readings.
+    /// Smoother on all readings.
     Smoother,
 }
 
@@ -87,71 +84,69 @@ impl std::fmt::Display for Chain {
     }
 }
 
-/// Errors of one chain, over the calibrations.
+/// Errors of one chain over the calibrations.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChainRow {
-    /// The chain.
+    /// Chain.
     pub chain: Chain,
-    /// Mean error of presses within the inner plate, in metres; `None` for a tracker, which needs readings in time.
+    /// Mean error of inner presses, m; `None` for trackers.
     pub error_m: Option<Quantiles>,
-    /// Share of these presses with an error within the tolerance, in %.
+    /// Share of these within the tolerance, %.
     pub effective_percent: Option<Quantiles>,
-    /// Mean error of readings of the moving load, in metres.
+    /// Mean error of the moving load, m.
     pub moving_error_m: Quantiles,
-    /// Mean of the Cramér–Rao bound over the same presses for the chain's inputs, in metres; `None` for a tracker, and if the
-    /// inputs do not determine the position of every press.
+    /// Mean Cramér–Rao bound of these, m; `None` for trackers or undetermined positions.
     pub limit_m: Option<f64>,
 }
 
 /// Results of the study.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ElliottResults {
-    /// The share of the readings' variance that each component carries, in %, of the first calibration.
+    /// Variance shares in the first calibration, %.
     pub variance_percent: Vec<f64>,
-    /// One row for each chain.
+    /// Rows by chain.
     pub rows: Vec<ChainRow>,
 }
 
-/// Error of running the study.
+/// Error of the study.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ElliottError {
-    /// The rig cannot be simulated.
+    /// Failed simulation.
     #[error(transparent)]
     Simulate(#[from] RigSimulationError),
-    /// A chain cannot be fitted.
+    /// Failed fit.
     #[error(transparent)]
     Fit(#[from] FitError),
-    /// A locator does not suit the readings.
+    /// Reading that does not suit a locator.
     #[error(transparent)]
     Reading(#[from] ReadingError),
-    /// The influence locator cannot track contacts.
+    /// Failed tracking.
     #[error(transparent)]
     Follow(#[from] FollowError),
-    /// The noise is singular.
+    /// Singular noise.
     #[error(transparent)]
     Noise(#[from] NoiseError),
-    /// A number of components outside the range.
+    /// Number of components out of range.
     #[error(
         "{components} components are requested of {sensors} sensors; expected 1 to the number of sensors"
     )]
     Components {
-        /// The number of components.
+        /// Number of components.
         components: usize,
         /// Sensors.
         sensors: usize,
     },
-    /// The number of calibrations is 0.
+    /// No calibrations.
     #[error("0 calibrations are requested; expected at least 1")]
     NoCalibration,
-    /// The tracker did not detect the moving load.
+    /// Undetected load.
     #[error("the tracker never found the moving load")]
     NothingTracked,
 }
 
-/// The errors of one chain in one calibration.
 #[derive(Clone, Copy, Debug)]
 struct ChainErrors {
-    /// Mean error in metres and effective percentage.
+    /// Mean error (m) and effective area (%).
     pressed: Option<(f64, f64)>,
     moving_error_m: f64,
 }
@@ -160,8 +155,8 @@ impl Elliott {
     /// Runs the study.
     ///
     /// # Errors
-    /// [`ElliottError`] for a rig without a model, a known force, training positions or a motion, and for a number of components
-    /// outside the range.
+    /// [`ElliottError`] without model, known force, training positions or motion, and for a number of
+    /// components out of range.
     pub fn run(&self, watch: Watch) -> Result<ElliottResults, ElliottError> {
         let sensors = self.rig.setup.layout().len();
         if let Some(&components) = self.components.iter().find(|count| !(1..=sensors).contains(*count)) {
@@ -189,13 +184,12 @@ impl Elliott {
         Ok(ElliottResults { variance_percent: first.variance_percent(), rows })
     }
 
-    /// Greatest number of rounds of the fits in [`Elliott::run`], each reported to `watch`.
+    /// Largest number of rounds that [`Elliott::run`] reports.
     pub fn most_rounds(&self) -> u64 {
         let networks = self.components.len() as u64 + 1;
         self.calibrations * networks * u64::from(self.network().training.max_epochs)
     }
 
-    /// Every chain, in the order of the results.
     fn chains(&self) -> Vec<Chain> {
         let components = self.components.iter().map(|count| Chain::Components(*count));
         let others = [Chain::Readings, Chain::Influence, Chain::Filter, Chain::Smoother];
@@ -212,7 +206,6 @@ impl Elliott {
         network
     }
 
-    /// Errors of every chain in one calibration, in the order of [`Elliott::chains`].
     fn judge(&self, setup: &TrialSetup, watch: Watch) -> Result<Vec<ChainErrors>, ElliottError> {
         let whole = &self.rig.setup;
         let network = Estimator::Network(self.network());
@@ -240,7 +233,6 @@ impl Elliott {
         Ok(judged)
     }
 
-    /// The errors of a locator, reading by reading.
     fn judge_readings(&self, locator: &Locator, setup: &TrialSetup) -> Result<ChainErrors, ElliottError> {
         let mut pressed = Evaluation::new(locator, &setup.trial.judged)?;
         let extent = self.rig.setup.surface().extent();
@@ -253,7 +245,7 @@ impl Elliott {
         })
     }
 
-    /// The errors of a locator's tracker, with the readings up to each time and with all readings.
+    /// Errors of filter and smoother.
     fn judge_tracks(&self, locator: &Locator, setup: &TrialSetup) -> Result<[ChainErrors; 2], ElliottError> {
         let followed = follow(locator, TrackerConfig::default(), setup.moving)?;
         let (truths, extent) = (setup.moving.truths(), self.rig.setup.surface().extent());
@@ -264,7 +256,6 @@ impl Elliott {
         Ok([judge(&followed.filtered)?, judge(&followed.smoothed)?])
     }
 
-    /// The derivatives of all readings at each judged contact.
     fn gradients(&self, trials: &[Split]) -> Result<Vec<Vec<ResponseGradient>>, ElliottError> {
         let setup = &self.rig.setup;
         let model = setup.surface().model().ok_or(RigSimulationError::from(SimulateError::NoModel))?;
@@ -311,7 +302,6 @@ impl Elliott {
     }
 }
 
-/// The data that the chains of one calibration share.
 #[derive(Clone, Copy)]
 struct TrialSetup<'a> {
     trial: &'a Split,
@@ -326,7 +316,6 @@ impl TrialSetup<'_> {
     }
 }
 
-/// Whether a contact lies within the inner part of a plate.
 fn is_inner(position: Position, extent: Extent) -> bool {
     let inner = |(at_m, side_m): (f64, f64)| (at_m / side_m - 0.5).abs() <= 0.5 * INNER;
     extent.coordinates_m(position).zip(extent.sides_m()).all(inner)

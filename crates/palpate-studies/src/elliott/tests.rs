@@ -1,10 +1,10 @@
-//! The reduction is a rotation, and a chain with enough components is about as accurate as one with all readings.
+//! Tests of the reduction and of chains.
 
 use super::*;
 use palpate_estimators::recording::Recording;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// The bench of the study on a mesh that is solved at once.
+/// The rig of the study on a coarse mesh.
 fn rig() -> Rig {
     Rig::from_toml(&RIG_TOML.replacen("edges =", "elements = 24\nedges =", 1)).unwrap()
 }

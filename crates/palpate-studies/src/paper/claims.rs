@@ -1,7 +1,4 @@
-//! Claims of the paper in words, and whether the seeds confirm them.
-//!
-//! A claim is split into parts that a program can check. Each part is checked twice: with the medians over all seeds, and
-//! with every seed by itself (seed k of one arm beside seed k of another: they start from the same random stream).
+//! Claims of the paper, checked by the medians and for each seed k (equal random streams in all arms).
 
 use serde::Serialize;
 
@@ -11,42 +8,42 @@ use crate::{ArmOutcome, Judging, TrainedSeed};
 use palpate_estimators::evaluation::Portion;
 use palpate_mechanics::contact::Position;
 
-/// A claim with the results of its checks.
+/// Claim with the results of its checks.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Claim {
     /// "C1" to "C8".
     pub id: &'static str,
-    /// The claim in words.
+    /// Claim in words.
     pub claim: &'static str,
-    /// Whether every part is true of the medians.
+    /// True if the medians confirm all parts.
     pub holds: bool,
-    /// Share of the seeds for which every part is true, 0 to 1.
+    /// Share of the seeds that confirm all parts, 0 to 1.
     pub share_of_seeds: f64,
     /// Parts.
     pub parts: Vec<ClaimPart>,
 }
 
-/// One checkable part of a claim.
+/// Checkable part of a claim.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ClaimPart {
-    /// The checked statement, in words.
+    /// Statement in words.
     pub what: String,
-    /// Whether it is true of the medians.
+    /// True if the medians confirm it.
     pub holds: bool,
-    /// Share of the seeds for which it is true, 0 to 1.
+    /// Share of the seeds that confirm it, 0 to 1.
     pub share_of_seeds: f64,
 }
 
-/// The paper's sensor pitch, l/9, as a share of the length.
+/// Sensor pitch of the paper, l/9, %.
 const PITCH_PERCENT: f64 = 100.0 / 9.0;
-/// "About 1 %" is counted as between a half and one and a half.
+/// Range of "about 1 %".
 const ABOUT_ONE: std::ops::RangeInclusive<f64> = 0.5..=1.5;
-/// "Linear" is counted as: the two increments differ by no more than this factor.
+/// Largest ratio of "linear" increments.
 const LINEAR_FACTOR: f64 = 2.0;
-/// The portion with good accuracy according to the paper, in metres.
+/// Accurate portion according to the paper, m.
 const GOOD: Portion = Portion { from_m: 0.060, to_m: 0.300 };
 
-/// Checks every claim, C1 to C8, with the outcomes of the paper's study. A claim is left out unless all its arms were run.
+/// Checks the claims C1 to C8; omits claims with missing arms.
 pub fn claims(outcomes: &[ArmOutcome], judging: &Judging) -> Vec<Claim> {
     let table = Table { outcomes, judging };
     let claims = [
@@ -86,21 +83,19 @@ pub fn claims(outcomes: &[ArmOutcome], judging: &Judging) -> Vec<Claim> {
     claims.into_iter().filter_map(|(id, claim, parts)| table.judge(id, claim, &parts)).collect()
 }
 
-/// A figure of one seed of an arm.
 #[derive(Clone, Copy)]
 enum Figure {
     Error,
-    /// Average error outside the good portion.
+    /// Average error outside the accurate portion.
     EdgeError,
-    /// Average error inside the good portion.
+    /// Average error inside the accurate portion.
     GoodError,
-    /// The largest estimated position, in % of the length.
+    /// Largest estimated position, in % of the length.
     LargestPosition,
     Epochs,
     Effective,
 }
 
-/// Returns a figure of an arm.
 type Look<'a> = dyn Fn(&str, Figure) -> f64 + 'a;
 
 struct Part {
@@ -229,7 +224,6 @@ struct Table<'a> {
 }
 
 impl Table<'_> {
-    /// Checks a claim; `None` when an arm that it needs has no fits.
     fn judge(&self, id: &'static str, claim: &'static str, parts: &[Part]) -> Option<Claim> {
         let seeds = self.outcomes.iter().map(|outcome| outcome.fits.len()).min().unwrap_or(0);
         let asked = std::cell::Cell::new(true);

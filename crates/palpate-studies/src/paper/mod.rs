@@ -7,8 +7,8 @@ mod published;
 pub use claims::{Claim, ClaimPart, claims};
 pub use published::{Agreement, PublishedFigure, Yardstick, published_figures};
 
-/// The study file, `studies/paper.toml`.
+/// Study file `studies/paper.toml`.
 pub const STUDY_TOML: &str = include_str!("paper.toml");
 
-/// The paper's numbers of training positions.
+/// Numbers of training positions.
 pub const COUNTS: [u32; 3] = [10, 20, 30];

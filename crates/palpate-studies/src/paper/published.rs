@@ -1,19 +1,19 @@
-//! The figures that the paper prints, each from one training run, beside those of this study.
+//! Published figures of the paper, each from one training run.
 
 use serde::Serialize;
 
 use crate::{ArmResults, StudyResults};
 use palpate_estimators::evaluation::Quantiles;
 
-/// Criterion of agreement between the study's median and a published figure.
+/// Criterion of agreement with a published figure.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Yardstick {
-    /// The difference is at most this, in the figure's own unit.
+    /// Largest difference, in the figure's unit.
     Within(f64),
-    /// The ratio, the larger to the smaller, is at most this.
+    /// Largest ratio of the larger to the smaller.
     Factor(f64),
-    /// The paper gives a bound, and the median is below it.
+    /// The published figure is an upper bound.
     Below,
 }
 
@@ -26,7 +26,7 @@ impl Yardstick {
         }
     }
 
-    /// The criterion in words; `published` is the figure as the paper prints it: "±0.6 points".
+    /// Describes the criterion; `published` as printed: "±0.6 points".
     pub fn in_words(self, published: &str) -> String {
         match self {
             Self::Within(difference) => format!("±{difference} points"),
@@ -36,14 +36,13 @@ impl Yardstick {
     }
 }
 
-/// Quantity that a published figure measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Figure {
     Epochs,
     Error,
-    /// Average error within a portion of the study, by its index.
+    /// Average error within a portion (index).
     PortionError(usize),
-    /// Largest error within a portion of the study, by its index.
+    /// Largest error within a portion (index).
     PortionMaxError(usize),
     EffectiveLength,
 }
@@ -70,8 +69,8 @@ impl Figure {
         }
     }
 
-    /// The criteria: errors within 0.6 points of the length (0.25 below 1 %), effective lengths within 6 points,
-    /// iterations within a factor of 3.
+    /// Errors within 0.6 points (0.25 below 1 %), effective lengths within 6 points, iterations within a
+    /// factor of 3.
     fn yardstick(self, published: f64) -> Yardstick {
         match self {
             Self::Epochs => Yardstick::Factor(3.0),
@@ -83,7 +82,7 @@ impl Figure {
     }
 }
 
-/// The figures of the paper's sections 3.1 to 3.3, by arm.
+/// Figures of sections 3.1 to 3.3 by arm.
 const PUBLISHED: [(&str, Figure, f64); 16] = [
     ("position-10", Figure::Epochs, 26_850.0),
     ("position-10", Figure::Error, 3.6),
@@ -103,34 +102,34 @@ const PUBLISHED: [(&str, Figure, f64); 16] = [
     ("middle4-30", Figure::EffectiveLength, 94.8),
 ];
 
-/// A figure that the paper prints, beside that of the study.
+/// Published figure beside that of the study.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PublishedFigure {
     /// Arm and figure: "position-10.error_percent".
     pub id: String,
-    /// The arm.
+    /// Arm.
     pub arm: &'static str,
-    /// The figure in words, with its unit.
+    /// Figure in words, with its unit.
     pub what: &'static str,
-    /// Value that the paper prints.
+    /// Published value.
     pub published: f64,
-    /// Quantiles over the study's seeds.
+    /// Quantiles over the seeds.
     #[serde(flatten)]
     pub found: Quantiles,
     /// Criterion of agreement.
     pub yardstick: Yardstick,
-    /// Whether the study's median agrees by the criterion.
+    /// True if the median agrees.
     pub agrees: bool,
-    /// Whether the published figure lies between the 5th and 95th percentile of the seeds; for a bound, whether the 5th is within it.
+    /// True within the 5th to 95th percentile; for a bound, above the 5th.
     pub within_seeds: bool,
 }
 
-/// Number of published figures that agree by either criterion, and of all.
+/// Numbers of figures that agree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Agreement {
-    /// Number of figures that agree with the medians.
+    /// Agreement with the medians.
     pub agreeing: usize,
-    /// Number of figures within the 5–95 % of the seeds.
+    /// Agreement with the 5–95 % range of the seeds.
     pub within_seeds: usize,
     /// Number of all figures.
     pub compared: usize,
@@ -149,7 +148,7 @@ impl Agreement {
     }
 }
 
-/// Every published figure of an arm among the results, beside that of the study.
+/// Compares all published figures among the results.
 pub fn published_figures(results: &StudyResults) -> Vec<PublishedFigure> {
     let beside = |&(arm, figure, published): &(&'static str, Figure, f64)| {
         let found = figure.spread(results.arm(arm)?)?;

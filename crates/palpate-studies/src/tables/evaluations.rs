@@ -1,9 +1,8 @@
-//! Rows of `evaluations.csv`: the located positions, one row for each fit of an estimator that is not a network.
+//! Rows of `evaluations.csv`, one per fit of another estimator than a network.
 //!
-//! Columns are the arm, the seed, and three columns with a value for each reading, in the order of the study's positions; all readings at one
-//! position follow each other. `estimates_m` contains the located positions in metres. `held` contains a character for each reading: 1 if the
-//! 95 % interval contains the contact, 0 if it does not, and - without an interval. `interval_scores_m` contains the interval scores in metres,
-//! or -. Floats are written so that they read back to the last bit.
+//! Columns: arm, seed, and one value per reading of `estimates_m` (located positions, m), `held` (1 if the 95
+//! % interval contains the contact, else 0; - without an interval) and `interval_scores_m` (m, or -). Floats
+//! read back to the last bit.
 
 use super::super::run::{PreparedStudy, Trained, TrainedSeed};
 use super::{RowProblem, fit_of, read_cell};
@@ -15,15 +14,12 @@ const COLUMNS: [&str; 5] = ["arm", "seed", ESTIMATES, HELD, SCORES];
 const ESTIMATES: &str = "estimates_m";
 const HELD: &str = "held";
 const SCORES: &str = "interval_scores_m";
-/// Placeholder for a missing value.
 const NOT_TOLD: &str = "-";
 
-/// The header.
 pub fn header() -> String {
     csv_row(COLUMNS)
 }
 
-/// The row of a fit.
 pub fn row(study: &PreparedStudy, Trained { arm, fit }: &Trained) -> String {
     let located = &fit.evaluation.located;
     let estimates: Vec<String> = located.iter().map(|at| at.estimate.x_m.to_string()).collect();
@@ -49,7 +45,6 @@ fn character(held: Option<bool>) -> char {
     }
 }
 
-/// The fit of a row.
 pub fn read(study: &PreparedStudy, row: &str) -> Result<Trained, RowProblem> {
     let cells: Vec<&str> = row.split(',').collect();
     let [arm_name, seed, estimates, held, scores] = cells[..] else {
@@ -81,7 +76,6 @@ pub fn read(study: &PreparedStudy, row: &str) -> Result<Trained, RowProblem> {
     Ok(Trained { arm, fit: TrainedSeed { seed, training: None, weights: Vec::new(), evaluation } })
 }
 
-/// Finite numbers separated by blanks, one for each of `readings`.
 fn numbers(column: &'static str, cell: &str, readings: usize) -> Result<Vec<Option<f64>>, RowProblem> {
     let number = |value: &str| -> Result<Option<f64>, RowProblem> {
         if value == NOT_TOLD {

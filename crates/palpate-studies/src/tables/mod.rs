@@ -1,7 +1,7 @@
-//! The two tables of a study's fits. Each finished fit adds a row, and a study is continued or assembled from the rows.
+//! Tables of a study's fits, by which a study is continued or assembled.
 //!
-//! `networks.csv` has a row for every fit; networks are restored from the weights in it. `evaluations.csv` has a row for every fit of another
-//! estimator, with the located position of each reading. Both begin with a comment that identifies the run; only its rows may follow.
+//! `networks.csv` has a row for every fit, with network weights; `evaluations.csv` has the positions of other
+//! estimators. A comment identifies the run.
 
 mod evaluations;
 mod networks;
@@ -12,10 +12,10 @@ use super::run::{PreparedStudy, Trained};
 use super::task::{MOST_SEEDS, Shard, Task};
 use palpate_rig::Study;
 
-/// A fit: the index of its arm in the study, and its seed.
+/// Index of the arm and seed.
 type Fit = (usize, u64);
 
-/// Rows of fits in the two tables, or the whole text of both: a plain value, which may be sent to another process or machine.
+/// Rows of fits, or both whole tables.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FitRows {
@@ -26,21 +26,20 @@ pub struct FitRows {
 }
 
 impl FitRows {
-    /// Adds further rows.
+    /// Appends rows.
     pub fn push(&mut self, rows: &Self) {
         self.networks += &rows.networks;
         self.evaluations += &rows.evaluations;
     }
 }
 
-/// The tables of a study, or of a shard of it.
+/// Tables of a study or shard.
 #[derive(Clone, Debug)]
 pub struct StudyTables<'a> {
     study: &'a PreparedStudy,
     shard: Option<ShardTasks>,
 }
 
-/// The tasks of a shard.
 #[derive(Clone, Debug)]
 struct ShardTasks {
     shard: Shard,
@@ -58,7 +57,7 @@ impl ShardTasks {
     }
 }
 
-/// A table of a study.
+/// Table of a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TableKind {
     /// `networks.csv`.
@@ -68,7 +67,7 @@ pub enum TableKind {
 }
 
 impl TableKind {
-    /// The name of its file.
+    /// File name.
     pub fn file_name(self) -> &'static str {
         match self {
             Self::Networks => "networks.csv",
@@ -76,7 +75,7 @@ impl TableKind {
         }
     }
 
-    /// The text of this table in `texts`.
+    /// Text of this table.
     pub fn text(self, texts: &FitRows) -> &str {
         match self {
             Self::Networks => &texts.networks,
@@ -88,41 +87,41 @@ impl TableKind {
 /// Fits read from tables.
 #[derive(Clone, Debug, Default)]
 pub struct Checkpoint {
-    /// The fits; they may include further seeds of an earlier run.
+    /// Fits, possibly of more seeds than requested.
     pub done: Vec<Trained>,
-    /// Number of fits in `networks.csv` that cannot be restored, because `evaluations.csv` has no row for them.
+    /// Fits without their row in `evaluations.csv`.
     pub without_evaluation: usize,
-    /// The tables with an incomplete last line, as a crash leaves it; that line was skipped.
+    /// Tables with a skipped, incomplete last line.
     pub cut_off: Vec<TableKind>,
 }
 
-/// Error of reading a table of an earlier run.
+/// Error of reading a table.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CheckpointError {
-    /// The table is of another study, another version of the study file or of palpate, or another shard.
+    /// Table of another study, version or shard.
     #[error("line 1 belongs to another run: it is `{found}`; this study writes `{wanted}`")]
     Heading {
-        /// The table.
+        /// Table.
         table: TableKind,
-        /// The file's first line.
+        /// First line.
         found: String,
-        /// The line that this study writes.
+        /// Expected line.
         wanted: String,
     },
-    /// A row that this study does not write.
+    /// Invalid row.
     #[error("line {line}: {problem}")]
     Row {
-        /// The table.
+        /// Table.
         table: TableKind,
-        /// The line, from 1.
+        /// Line, from 1.
         line: usize,
-        /// The problem.
+        /// Problem.
         problem: RowProblem,
     },
 }
 
 impl CheckpointError {
-    /// The table that could not be read.
+    /// Table of the error.
     pub fn table(&self) -> TableKind {
         match self {
             Self::Heading { table, .. } | Self::Row { table, .. } => *table,
@@ -133,7 +132,7 @@ impl CheckpointError {
 /// Problem of a row.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RowProblem {
-    /// Too few cells, or too many.
+    /// Wrong number of cells.
     #[error("the row has {found} cells; it must have {wanted}")]
     Cells {
         /// Number of cells.
@@ -141,73 +140,73 @@ pub enum RowProblem {
         /// Number of columns.
         wanted: usize,
     },
-    /// An arm that the study does not have.
+    /// Unknown arm.
     #[error("the study has no arm `{arm}`")]
     Arm {
-        /// The arm.
+        /// Arm.
         arm: String,
     },
-    /// A cell with an invalid value.
+    /// Invalid cell.
     #[error("{column}: `{found}` is not {wanted}")]
     Cell {
-        /// The column.
+        /// Column.
         column: &'static str,
-        /// The cell, or the invalid part of it.
+        /// Invalid text.
         found: String,
-        /// The expected value.
+        /// Expected value.
         wanted: &'static str,
     },
-    /// Weights for another network.
+    /// Weights of another network.
     #[error("weights: found {found}, which is not the network's number")]
     Weights {
         /// Number of weights.
         found: usize,
     },
-    /// Values for another number of readings.
+    /// Wrong number of readings.
     #[error("{column}: found {found} values; the arm is evaluated with {wanted} readings")]
     Readings {
-        /// The column.
+        /// Column.
         column: &'static str,
         /// Number of values.
         found: usize,
         /// Number of readings.
         wanted: usize,
     },
-    /// A row of a network in `evaluations.csv`, which has none.
+    /// A network in `evaluations.csv`.
     #[error("arm `{arm}` consists of networks, and networks.csv contains them")]
     Network {
-        /// The arm.
+        /// Arm.
         arm: String,
     },
-    /// A second row for a fit.
+    /// Duplicate fit.
     #[error("the fit of arm `{arm}` from seed {seed} is in line {first} already; take one of the two away")]
     Twice {
-        /// The arm.
+        /// Arm.
         arm: String,
-        /// The seed.
+        /// Seed.
         seed: u64,
-        /// Line of the first row.
+        /// First line.
         first: usize,
     },
-    /// A fit of another shard.
+    /// Fit of another shard.
     #[error("the fit of arm `{arm}` from seed {seed} is not of shard {shard}")]
     OtherShard {
-        /// The arm.
+        /// Arm.
         arm: String,
-        /// The seed.
+        /// Seed.
         seed: u64,
-        /// The shard of the table.
+        /// Shard of the table.
         shard: String,
     },
 }
 
 impl<'a> StudyTables<'a> {
-    /// The tables of a whole study.
+    /// Tables of a whole study.
     pub fn new(study: &'a PreparedStudy) -> Self {
         Self { study, shard: None }
     }
 
-    /// The tables of one shard of a study with `seeds` seeds.
+    /// Tables of one shard.
     pub fn of_shard(study: &'a PreparedStudy, shard: Shard, seeds: u64) -> Self {
         let block = study.lanes();
         let tasks = shard.share(study.tasks(seeds, block));
@@ -217,24 +216,24 @@ impl<'a> StudyTables<'a> {
         Self { study, shard: Some(ShardTasks { shard, seeds, tasks, block, beginnings }) }
     }
 
-    /// The shard with its number of seeds; `None` for the tables of a whole study.
+    /// Shard and number of seeds; `None` for a whole study.
     pub fn shard(&self) -> Option<(Shard, u64)> {
         self.shard.as_ref().map(|shard| (shard.shard, shard.seeds))
     }
 
-    /// The tasks of the fits in the tables: those of the shard, or of `seeds` seeds of the whole study.
+    /// Lists the tasks of the shard, or of the study.
     pub fn tasks(&self, seeds: u64) -> Vec<Task> {
         self.shard
             .as_ref()
             .map_or_else(|| self.study.tasks(seeds, self.study.lanes()), |shard| shard.tasks.clone())
     }
 
-    /// Whether the study has an `evaluations.csv`: some arm has an estimator that is not a network.
+    /// True if some arm has another estimator than a network.
     pub fn has_evaluations(&self) -> bool {
         (0..self.study.study.arms.len()).any(|arm| !self.study.keeps_weights(arm))
     }
 
-    /// The comment and the header at the beginning of each table; for `evaluations.csv` an empty text if the study has none.
+    /// Comment and header of each table, if any.
     pub fn headings(&self) -> FitRows {
         let comment = self.comment();
         let evaluations = self.has_evaluations().then(|| comment.clone() + &evaluations::header());
@@ -253,7 +252,7 @@ impl<'a> StudyTables<'a> {
         format!("# palpate {version}, study {name}, sha256 {digest}, {precision}{shard}\n")
     }
 
-    /// The rows of a fit.
+    /// Formats the rows of a fit.
     pub fn rows(&self, trained: &Trained) -> FitRows {
         let is_kept_by_weights = self.study.keeps_weights(trained.arm);
         FitRows {
@@ -266,7 +265,7 @@ impl<'a> StudyTables<'a> {
         }
     }
 
-    /// The whole tables of some fits, sorted by arm and seed; the order of `fits` has no effect.
+    /// Formats whole tables, sorted by arm and seed.
     pub fn whole(&self, fits: &[Trained]) -> FitRows {
         let mut sorted: Vec<&Trained> = fits.iter().collect();
         sorted.sort_by_key(|trained| (trained.arm, trained.fit.seed));
@@ -275,10 +274,10 @@ impl<'a> StudyTables<'a> {
         whole
     }
 
-    /// Reads the fits of an earlier run of this study, or shard, from its tables; the text of a missing table is empty.
+    /// Reads the fits of an earlier run; a missing table is empty.
     ///
     /// # Errors
-    /// [`CheckpointError`] when a table belongs to another run or contains a row that this study does not write.
+    /// [`CheckpointError`] for another run or an invalid row.
     pub fn read(&self, texts: &FitRows) -> Result<Checkpoint, CheckpointError> {
         let headings = self.headings();
         let mut checkpoint = Checkpoint::default();
@@ -300,7 +299,7 @@ impl<'a> StudyTables<'a> {
         Ok(checkpoint)
     }
 
-    /// Reads `networks.csv`: the networks, and the fits of other estimators.
+    /// Reads the networks, and the fits of other estimators.
     fn read_networks(&self, rows: &[(usize, &str)]) -> Result<(Vec<Trained>, Vec<Fit>), CheckpointError> {
         let (mut restored, mut others, mut seen) = (Vec::new(), Vec::new(), HashMap::new());
         let table = TableKind::Networks;
@@ -316,7 +315,6 @@ impl<'a> StudyTables<'a> {
         Ok((restored, others))
     }
 
-    /// Reads the fits in `evaluations.csv`.
     fn read_evaluations(&self, rows: &[(usize, &str)]) -> Result<Vec<Trained>, CheckpointError> {
         let (mut restored, mut seen) = (Vec::new(), HashMap::new());
         let table = TableKind::Evaluations;
@@ -329,7 +327,6 @@ impl<'a> StudyTables<'a> {
         Ok(restored)
     }
 
-    /// Checks that a fit has one row, and that the shard of the tables includes it.
     fn check(&self, fit: Fit, line: usize, seen: &mut HashMap<Fit, usize>) -> Result<(), RowProblem> {
         let (arm, seed) = (self.study.study.arms[fit.0].name.clone(), fit.1);
         if let Some(shard) = self.shard.as_ref().filter(|shard| !shard.holds(fit)) {
@@ -342,10 +339,8 @@ impl<'a> StudyTables<'a> {
     }
 }
 
-/// Text before the number of a shard in a table's comment.
 const SHARD: &str = ", shard ";
 
-/// The shard in a table's first line, with its seeds; `None` without one.
 pub(crate) fn shard_in(text: &str) -> Option<(Shard, u64)> {
     let (_, told) = text.lines().next()?.rsplit_once(SHARD)?;
     let (shard, seeds) = told.strip_suffix(" seeds")?.split_once(" of ")?;
@@ -353,15 +348,13 @@ pub(crate) fn shard_in(text: &str) -> Option<(Shard, u64)> {
     Some((shard.parse().ok()?, seeds))
 }
 
-/// Rows of a table.
 struct Rows<'a> {
-    /// Whole rows, each with its line from 1.
+    /// Whole rows with their lines, from 1.
     whole: Vec<(usize, &'a str)>,
-    /// Whether the last line has no end.
+    /// True for an incomplete last line.
     cut_off: bool,
 }
 
-/// The rows below the heading of a table; empty for an empty text.
 fn rows_below<'a>(table: TableKind, text: &'a str, heading: &str) -> Result<Rows<'a>, CheckpointError> {
     if text.is_empty() {
         return Ok(Rows { whole: Vec::new(), cut_off: false });
@@ -379,7 +372,6 @@ fn rows_below<'a>(table: TableKind, text: &'a str, heading: &str) -> Result<Rows
     })
 }
 
-/// The fit of a row: the index of its arm in the study, and its seed.
 fn fit_of(study: &PreparedStudy, arm: &str, seed: &str) -> Result<Fit, RowProblem> {
     let place = study.arm(arm).map_err(|_| RowProblem::Arm { arm: shortened(arm) })?;
     let seed = read_cell("seed", seed, "a whole number")?;
@@ -394,7 +386,6 @@ fn read_cell<T: std::str::FromStr>(
     cell.parse().map_err(|_| RowProblem::Cell { column, found: shortened(cell), wanted })
 }
 
-/// A cell, shortened to the length that a message shows.
 fn shortened(cell: &str) -> String {
     const MOST: usize = 40;
     let mut shown: String = cell.chars().take(MOST).collect();

@@ -1,10 +1,10 @@
-//! Rows of `networks.csv`, one for each fit.
+//! Rows of `networks.csv`, one per fit.
 //!
-//! Columns are the arm and the seed; epochs, status and aggregate error of a network's training; the errors of the fit in % of the
-//! surface's length; the effective length; and the weights of a network. Cells that do not apply to another estimator are empty.
+//! Columns: arm, seed; epochs, status and aggregate error of training; errors in % of the length; effective
+//! length; weights. Cells without a meaning are empty.
 //!
-//! Weights are in the order of `palpate_core::Network`: layer by layer from the input side, and node by node within a layer. Each node has the
-//! weights of the nodes before it, in their order, and then its bias, if there are biases. Inputs are the channels in the layout's order.
+//! Weights are in the order of `palpate_core::Network`: by layer from the inputs, by node; each node has the
+//! weights of the nodes before it, then its bias, if any. Inputs are in the order of the layout.
 
 use super::super::results::percent;
 use super::super::run::{PreparedStudy, Trained};
@@ -14,7 +14,6 @@ use palpate_estimators::recording::csv_row;
 
 const OUTCOME_COLUMNS: [&str; 5] = ["arm", "seed", "epochs", "status", "aggregate_error"];
 
-/// The header.
 pub fn header(study: &PreparedStudy) -> String {
     let mut columns: Vec<String> = OUTCOME_COLUMNS.map(str::to_owned).into();
     columns.extend(metrics(study, None).into_iter().map(|(name, _)| name));
@@ -22,7 +21,6 @@ pub fn header(study: &PreparedStudy) -> String {
     csv_row(columns)
 }
 
-/// The row of a fit.
 pub fn row(study: &PreparedStudy, trained: &Trained) -> String {
     let outcome = &trained.fit.training;
     let told = |told: fn(&TrainingOutcome) -> String| outcome.as_ref().map_or_else(String::new, told);
@@ -39,7 +37,6 @@ pub fn row(study: &PreparedStudy, trained: &Trained) -> String {
     csv_row(cells)
 }
 
-/// The names of the metrics, with their values for a fit.
 fn metrics(study: &PreparedStudy, trained: Option<&Trained>) -> Vec<(String, f64)> {
     let judging = study.judging();
     let value = |portion, pick| {
@@ -61,7 +58,6 @@ fn metrics(study: &PreparedStudy, trained: Option<&Trained>) -> Vec<(String, f64
     metrics
 }
 
-/// A row's fit, and its cells.
 pub fn cells<'r>(study: &PreparedStudy, row: &'r str) -> Result<((usize, u64), Vec<&'r str>), RowProblem> {
     let cells: Vec<&str> = row.split(',').collect();
     let wanted = OUTCOME_COLUMNS.len() + metrics(study, None).len() + 1;
@@ -71,7 +67,6 @@ pub fn cells<'r>(study: &PreparedStudy, row: &'r str) -> Result<((usize, u64), V
     }
 }
 
-/// The network of a row.
 pub fn restore(
     study: &PreparedStudy,
     (arm, seed): (usize, u64),

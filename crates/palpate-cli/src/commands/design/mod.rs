@@ -1,4 +1,4 @@
-//! `palpate design`: what to build, and where to press, before the work begins.
+//! `palpate design`: sensor layouts and training positions.
 
 mod positions;
 mod sensors;
@@ -14,7 +14,6 @@ use palpate_rig::Rig;
 use std::path::Path;
 use toml_edit::{DocumentMut, TomlError, Value};
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Design a layout of four sensors
@@ -44,7 +43,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// Prints the paths of the rig and the report, if they were requested.
 fn say_files(rig: Option<&Path>, report_folder: Option<&Path>) -> Result<(), Failure> {
     if let Some(path) = rig {
         output::say(format!("\nRig: {}", path.display()))?;
@@ -52,7 +50,7 @@ fn say_files(rig: Option<&Path>, report_folder: Option<&Path>) -> Result<(), Fai
     output::say_report("\n", report_folder)
 }
 
-/// The rig of `text` with a `change`, and its text, unchanged elsewhere; `path` is its future file.
+/// Applies `change` to the rig `text`; `path` is the new file.
 fn changed_rig(
     path: &Path,
     text: &str,
@@ -65,12 +63,11 @@ fn changed_rig(
     Ok((input::parse_rig(path, &written)?, written))
 }
 
-/// Failure of a design that was stopped, or that the rig does not allow.
 fn design_complaint(error: &(dyn std::error::Error + 'static), rig: &Path, help: &str) -> Failure {
     if Cancelled::caused(error) { Failure::stopped() } else { Complaint::about(rig, error).help(help).into() }
 }
 
-/// A position in the form of a rig file: on a line a length, on a plane a pair of lengths. `in_mm` rounds.
+/// Converts a position to one length on a line, two on a plane.
 fn toml_position(position: Position, extent: Extent, in_mm: fn(f64) -> f64) -> Value {
     let lengths = extent.coordinates_m(position).map(|at_m| format!("{} mm", in_mm(at_m)));
     match extent {
@@ -79,7 +76,6 @@ fn toml_position(position: Position, extent: Extent, in_mm: fn(f64) -> f64) -> V
     }
 }
 
-/// A length in millimetres, to a micrometre.
 fn to_micrometre(length_m: f64) -> f64 {
     (length_m * 1e6).round() / 1e3
 }

@@ -1,4 +1,5 @@
-//! `palpate design positions`: where to press, compared with even positions; and the next press of a recording.
+//! `palpate design positions`: training positions, compared with even ones; and the next press of a
+//! recording.
 
 use super::{changed_rig, design_complaint, say_files, to_micrometre, toml_position};
 use crate::failure::Failure;
@@ -21,7 +22,6 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use toml_edit::{Array, DocumentMut, Item, Table as TomlTable, value};
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Design six training positions with a short search, and write the rig with them
@@ -77,7 +77,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Designed positions, with their design task.
 struct Outcome<'a> {
     rig: &'a Path,
     estimator: &'static str,
@@ -116,7 +115,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     say_files(arguments.out.as_deref(), arguments.report.as_deref())
 }
 
-/// Design settings of the rig and the command line.
 fn what_to_design(arguments: &Arguments, rig: &Rig) -> PositionDesign {
     let design = rig.training.as_ref().map_or_else(PositionDesign::default, PositionDesign::for_training);
     let design = rig.design.iter().fold(design, PositionDesign::contacts_of);
@@ -155,7 +153,6 @@ fn complaint(error: &PositionError, rig: &Path) -> Failure {
     design_complaint(error, rig, help(error))
 }
 
-/// Remedy for an error of placing training positions.
 fn help(error: &PositionError) -> &'static str {
     match error {
         PositionError::Cancelled(_) => "start it again",
@@ -182,7 +179,6 @@ fn help(error: &PositionError) -> &'static str {
     }
 }
 
-/// Prints the results as text.
 fn print(outcome: &Outcome) -> Result<(), Failure> {
     let (problem, design) = (outcome.problem, outcome.problem.design());
     output::say(format!(
@@ -226,7 +222,7 @@ fn errors(outcome: &Outcome) -> String {
         .to_string()
 }
 
-/// Three decimals, or as many as a small number needs for two significant digits.
+/// Formats three decimals, or two significant digits of a small number.
 fn figure(value: f64) -> String {
     if value >= 0.01 || value == 0.0 { format!("{value:.3}") } else { format!("{value:.1e}") }
 }
@@ -251,7 +247,6 @@ fn gain(outcome: &Outcome, best: &Placed) -> String {
     }
 }
 
-/// JSON of a design of training positions.
 fn to_json(outcome: &Outcome) -> impl Serialize {
     let (problem, asked) = (outcome.problem, outcome.problem.design());
     let design = |placed: &Placed| {
@@ -284,10 +279,8 @@ fn in_mm(position: Position) -> impl Serialize {
     object! { "x_mm": position.x_m * 1e3, "y_mm": position.y_m * 1e3 }
 }
 
-/// Keys of [training] that define the positions.
 const PLACES: [&str; 6] = ["arrangement", "count", "grid", "middle", "portion", "positions"];
 
-/// Replaces the training positions of a rig; the rest of its text stays as it was.
 fn place_presses(rig: &mut DocumentMut, positions: &[Position], repeats: usize, extent: Extent) {
     let own = rig.get("training").and_then(Item::as_table).cloned();
     let mut training = own.unwrap_or_else(TomlTable::new);
@@ -301,10 +294,8 @@ fn place_presses(rig: &mut DocumentMut, positions: &[Position], repeats: usize, 
     rig.insert("training", Item::Table(training));
 }
 
-/// Number of presses in the table.
 const SHOWN: usize = 5;
 
-/// Prints advice on the next presses.
 fn advise(arguments: &Arguments, rig: &Rig, recording: &Recording) -> Result<(), Failure> {
     let design = what_to_design(arguments, rig);
     if recording.rows.iter().any(|row| !row.nuisances.is_empty()) {
@@ -321,7 +312,7 @@ fn advise(arguments: &Arguments, rig: &Rig, recording: &Recording) -> Result<(),
     print_advice(&advice, rig.setup.surface().extent())
 }
 
-/// JSON of the advice on the next presses; standard deviations are averaged over the contacts.
+/// Standard deviations are averaged over the contacts.
 fn advice_to_json(arguments: &Arguments, advice: &Advice) -> impl Serialize {
     let next = advice.next.iter().map(|press| {
         object! {
@@ -341,7 +332,7 @@ fn advice_to_json(arguments: &Arguments, advice: &Advice) -> impl Serialize {
         "stop_below_percent": advice.stop_percent,
         "enough": advice.is_enough(),
         "next": next.collect::<Vec<_>>(),
-        // Number of further presses until the stopping rule is met; null if it exceeds the largest number.
+        // Number of presses until the stopping rule is met; null above the largest number.
         "presses_to_go": advice.reaches_goal().then_some(advice.next.len()),
     }
 }

@@ -1,4 +1,4 @@
-//! `palpate design sensors`: kinds and places of sensors, compared with the even layout.
+//! `palpate design sensors`: kinds and positions of sensors, compared with the even layout.
 
 use super::{changed_rig, design_complaint, say_files, to_micrometre, toml_position};
 use crate::cost::MemoryOption;
@@ -28,7 +28,6 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table as TomlTable, Value, value};
 
-/// Examples in the long help.
 const EXAMPLES: &str = "\
 Examples:
   # Design a layout of four sensors, and write the rig with it
@@ -81,7 +80,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Designed layouts, with their design task.
 struct Outcome<'a> {
     rig: &'a Path,
     problem: &'a SensorProblem<'a>,
@@ -135,7 +133,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     say_files(arguments.out.as_deref(), arguments.report.as_deref())
 }
 
-/// The rig's bench and design, with the options of the command line.
 fn what_to_design(arguments: &Arguments, rig: &Rig) -> Result<(Setup, SensorDesign), Failure> {
     let force_n = arguments.force.or(rig.setup.force_n());
     let setup = rig.setup.clone().with_force(force_n);
@@ -213,10 +210,9 @@ fn complaint(error: &DesignError, rig: &Path) -> Failure {
     design_complaint(error, rig, help(error))
 }
 
-/// Largest number of sensors in a curve.
 const MOST_COUNT: usize = 200;
 
-/// "2..16" as a range, both ends included.
+/// Parses "2..16", both ends included.
 fn counts(text: &str) -> Result<RangeInclusive<usize>, String> {
     let form = || format!("`{text}` is not a range; write the smallest and the largest number, as in 2..16");
     let (from, to) = text.split_once("..").ok_or_else(form)?;
@@ -228,7 +224,6 @@ fn counts(text: &str) -> Result<RangeInclusive<usize>, String> {
     Ok(from..=to)
 }
 
-/// Remedy for an error of placing sensors.
 pub fn help(error: &DesignError) -> &'static str {
     match error {
         DesignError::Limit(LimitError::NoModel) => "give a surface with a model, such as `kind = \"beam\"`",
@@ -268,7 +263,6 @@ pub fn help(error: &DesignError) -> &'static str {
     }
 }
 
-/// Prints the designs as text.
 fn print(outcome: &Outcome) -> Result<(), Failure> {
     let (problem, design) = (outcome.problem, outcome.problem.design());
     output::say(format!(
@@ -301,7 +295,6 @@ fn print(outcome: &Outcome) -> Result<(), Failure> {
     if outcome.counts.is_empty() { Ok(()) } else { print_counts(outcome) }
 }
 
-/// "1 contact, at 12000 mm, is over a support …": the excluded contacts; `None` if there are none.
 fn left_out_in_words(problem: &SensorProblem) -> Option<String> {
     let places = problem.contacts_over_supports();
     let reason = "where an unknown force is unidentifiable: excluded from scores and limits";
@@ -356,7 +349,6 @@ fn designs(outcome: &Outcome) -> String {
     table.to_string()
 }
 
-/// Gain over the even layout, in words.
 fn gain(outcome: &Outcome, best: &Designed) -> String {
     let name = best.method.name();
     let (even, reference) = match outcome.problem.reference(&outcome.designed) {
@@ -405,8 +397,8 @@ fn print_counts(outcome: &Outcome) -> Result<(), Failure> {
     }
 }
 
-/// JSON of a sensor design. A limit is null if the readings do not determine some contact. Scores of limits are in mm, of the share
-/// beyond the tolerance in %, of D-optimality ½·ln det.
+/// Limits of unidentifiable contacts are null. Scores: limits in mm, the share beyond the tolerance
+/// in %, D-optimality as ½·ln det.
 fn to_json(outcome: &Outcome) -> impl Serialize {
     let (problem, design) = (outcome.problem, outcome.problem.design());
     let scale = design.criterion.score_scale();
@@ -428,11 +420,10 @@ fn to_json(outcome: &Outcome) -> impl Serialize {
             "measure": sensor.kind,
             "x_mm": sensor.position.x_m * 1e3,
             "y_mm": sensor.position.y_m * 1e3,
-            // Whether it is an existing sensor that is kept.
+            // True for an existing sensor that is kept.
             "kept"?: (!design.kept.is_empty()).then(|| problem.is_kept(sensor)),
         }
     };
-    // Errors of simulated calibrations.
     let simulated = |verification: &Verification| {
         object! {
             "mean_error_mm": verification.mean_error_m * 1e3,
@@ -472,10 +463,8 @@ fn to_json(outcome: &Outcome) -> impl Serialize {
     }
 }
 
-/// Keys of a section that define where its sensors are, or which of them are disabled.
 const PLACES: [&str; 4] = ["count", "grid", "positions", "dead"];
 
-/// Replaces the sensors of a rig, one section per kind; the rest of its text stays as it was.
 fn place_sensors(rig: &mut DocumentMut, layout: &Layout, kept: &[Sensor], extent: Extent) {
     let own = sections(rig.get("sensors"));
     let mut new = ArrayOfTables::new();
@@ -496,7 +485,7 @@ fn place_sensors(rig: &mut DocumentMut, layout: &Layout, kept: &[Sensor], extent
     if let (Some(first), Some(table)) = (own.first(), new.get_mut(0)) {
         table.decor_mut().clone_from(first.decor());
     }
-    // The place of the old sections.
+    // Position of the old sections in the file.
     let position = own.first().and_then(TomlTable::position);
     for table in new.iter_mut() {
         table.set_position(position);
@@ -512,7 +501,7 @@ fn sections(sensors: Option<&Item>) -> Vec<TomlTable> {
     }
 }
 
-/// The rig's section of this kind without its positions, or a new one; with the noise of the design.
+/// Returns the rig's section of this kind without positions, or a new one.
 fn section(kind: SensorKind, own: &[TomlTable], channel: &ChannelModel) -> TomlTable {
     let measures = |table: &&TomlTable| table.get("measure").and_then(Item::as_str) == Some(kind.name());
     let mut section = own.iter().find(measures).cloned().unwrap_or_default();
@@ -531,10 +520,10 @@ fn section(kind: SensorKind, own: &[TomlTable], channel: &ChannelModel) -> TomlT
     section
 }
 
-/// Positions of some sensors of one kind, in the form of a rig file.
 fn positions(sensors: &[&Sensor], extent: Extent) -> Array {
     let written = |sensor: &&Sensor| {
-        // The position of a reaction sensor must equal that of its support exactly; a micrometre is enough for the others.
+        // The position of a reaction sensor must equal that of its support exactly; a micrometre is
+        // enough for the others.
         let in_mm = match sensor.kind {
             SensorKind::Reaction => |at_m| at_m * 1e3,
             _ => to_micrometre,

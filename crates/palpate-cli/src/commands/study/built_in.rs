@@ -1,4 +1,4 @@
-//! Built-in studies besides the paper's: run whole, reported, and printed as a table.
+//! Built-in studies besides the paper's.
 
 use super::{Arguments, EarlierRun};
 use crate::failure::{Complaint, Failure};
@@ -13,10 +13,9 @@ use palpate_studies::dead_areas::{self, DeadAreaResults, DeadAreas};
 use palpate_studies::elliott::{self, Elliott, ElliottResults};
 use std::path::Path;
 
-/// Default number of calibrations without `--seeds`.
 const CALIBRATIONS: u64 = 3;
 
-/// Settings and findings of a study: the content of `results.json`.
+/// Content of `results.json`.
 #[derive(serde::Serialize)]
 struct Results<F> {
     palpate: &'static str,
@@ -27,7 +26,7 @@ struct Results<F> {
     findings: F,
 }
 
-/// `palpate study dead-areas`: errors between sensors, by estimator and by the number of sensors.
+/// `palpate study dead-areas`: errors between sensors.
 pub fn dead_areas(arguments: &Arguments) -> Result<(), Failure> {
     let study = DeadAreas {
         rig: input::parse_rig(Path::new("examples/dead-areas.toml"), dead_areas::RIG_TOML)?,
@@ -43,7 +42,8 @@ pub fn dead_areas(arguments: &Arguments) -> Result<(), Failure> {
     write((arguments, &out), &results, dead_areas_report(&study, &results.findings), tell_dead_areas)
 }
 
-/// `palpate study elliott`: components of a plate's readings and a network, beside the influence locator and its tracker.
+/// `palpate study elliott`: components of a plate's readings and a network, compared with influence
+/// locators.
 pub fn elliott(arguments: &Arguments) -> Result<(), Failure> {
     let study = Elliott {
         rig: input::parse_rig(Path::new("examples/elliott.toml"), elliott::RIG_TOML)?,
@@ -59,7 +59,6 @@ pub fn elliott(arguments: &Arguments) -> Result<(), Failure> {
     write((arguments, &out), &results, elliott_report(&study, &results.findings), tell_elliott)
 }
 
-/// The folder of a study that runs in minutes and cannot be resumed.
 fn folder(arguments: &Arguments, study: &str) -> Result<TargetFolder, Failure> {
     let in_shards = [(arguments.shard.is_some(), "--shard"), (!arguments.merge.is_empty(), "--merge")];
     if let Some((_, option)) = in_shards.into_iter().find(|(asked, _)| *asked) {
@@ -78,7 +77,7 @@ fn results<F>(study: &'static str, calibrations: u64, seed: u64, findings: F) ->
     Results { palpate: env!("CARGO_PKG_VERSION"), study, calibrations, seed, findings }
 }
 
-/// Runs a study that asks at most `most_rounds` times whether to continue.
+/// Runs a study that reports progress at most `most_rounds` times.
 fn fit<F, E>(most_rounds: u64, run: impl FnOnce(Watch) -> Result<F, E>) -> Result<F, Failure>
 where
     E: std::error::Error + 'static,
@@ -86,7 +85,6 @@ where
     Observer::of_rounds(most_rounds).watch(run).map_err(|error| Failure::from_error(&error))
 }
 
-/// Writes a study's report and results, and prints them.
 fn write<F: serde::Serialize>(
     (arguments, out): (&Arguments, &TargetFolder),
     results: &Results<F>,

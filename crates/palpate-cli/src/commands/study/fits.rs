@@ -1,4 +1,4 @@
-//! The finished fits of a study: for each one row in each table, and a step of the bar.
+//! Tables of a study's finished fits, one row per fit.
 //!
 //! The tables grow with every finished fit, survive Ctrl-C, and are sorted at the end.
 
@@ -17,7 +17,6 @@ use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// The tables, open for appending.
 pub struct FitFiles {
     networks: File,
     /// `None` if all fits are networks.
@@ -25,7 +24,7 @@ pub struct FitFiles {
 }
 
 impl FitFiles {
-    /// Starts the tables of a run with the fits of an earlier one. From here until its end the run counts as unfinished.
+    /// Starts the tables with the fits of an earlier run. The run is unfinished until its end.
     pub fn begin(out: &TargetFolder, tables: &StudyTables, done: &[Trained]) -> Result<Self, Failure> {
         out.remove(RESULTS_JSON)?;
         out.remove(SHARD_JSON)?;
@@ -39,7 +38,8 @@ impl FitFiles {
         Ok(Self { networks: open(NETWORKS_CSV)?, evaluations })
     }
 
-    /// Adds the rows of a fit, each in one write, so that rows are not interleaved. The fit is finished with the second row.
+    /// Adds each row in one write, so that rows are not interleaved. The second row finishes the
+    /// fit.
     fn add(&mut self, rows: &FitRows) -> std::io::Result<()> {
         if let Some(evaluations) = &mut self.evaluations {
             evaluations.write_all(rows.evaluations.as_bytes())?;
@@ -48,7 +48,6 @@ impl FitFiles {
     }
 }
 
-/// Writes complete tables; `evaluations.csv` only if there is one.
 pub fn write(out: &TargetFolder, whole: &FitRows) -> Result<(), Failure> {
     match whole.evaluations.is_empty() {
         true => out.remove(EVALUATIONS_CSV)?,
@@ -57,7 +56,6 @@ pub fn write(out: &TargetFolder, whole: &FitRows) -> Result<(), Failure> {
     out.write(NETWORKS_CSV, whole.networks.as_bytes())
 }
 
-/// The texts of the tables in a folder; empty for a missing file.
 pub fn read_texts(folder: &Path) -> Result<FitRows, Failure> {
     let text = |name| {
         let path = folder.join(name);
@@ -66,7 +64,6 @@ pub fn read_texts(folder: &Path) -> Result<FitRows, Failure> {
     Ok(FitRows { networks: text(NETWORKS_CSV)?, evaluations: text(EVALUATIONS_CSV)? })
 }
 
-/// Fits of an earlier run in a folder.
 pub fn read(out: &TargetFolder, tables: &StudyTables) -> Result<Checkpoint, Failure> {
     let texts = read_texts(out.path())?;
     let checkpoint = tables.read(&texts).map_err(|error| {
@@ -92,7 +89,6 @@ pub fn read(out: &TargetFolder, tables: &StudyTables) -> Result<Checkpoint, Fail
     Ok(checkpoint)
 }
 
-/// Adds the place of an unreadable row to a complaint about it.
 pub fn at_row(complaint: Complaint, name: &str, texts: &FitRows, error: &CheckpointError) -> Complaint {
     let CheckpointError::Row { table, line, .. } = error else { return complaint };
     let text = table.text(texts);
@@ -100,7 +96,7 @@ pub fn at_row(complaint: Complaint, name: &str, texts: &FitRows, error: &Checkpo
     complaint.at_line(name, *line, row, 0..row.find(',').unwrap_or(row.len()))
 }
 
-/// Reports that fits of an earlier run with more seeds stay in the tables, and that the results exclude them.
+/// Reports surplus fits of an earlier run, which the results exclude.
 pub fn say_surplus(earlier: &[Trained], options: RunOptions) {
     let surplus = earlier.iter().filter(|trained| trained.fit.seed >= options.seeds).count();
     if surplus > 0 {
@@ -112,7 +108,6 @@ pub fn say_surplus(earlier: &[Trained], options: RunOptions) {
     }
 }
 
-/// Progress of a run; every training thread adds its fits.
 pub struct Tally<'a> {
     prepared: &'a PreparedStudy,
     tables: &'a StudyTables<'a>,
@@ -125,13 +120,10 @@ struct State {
     files: FitFiles,
     error: Option<std::io::Error>,
     arms: Vec<ArmTally>,
-    /// Number of presentations in this run.
     presented: u64,
-    /// Number of fits in this run.
     fitted: u64,
 }
 
-/// Cost of an arm's fits: remaining and finished ones.
 #[derive(Clone, Copy, Default)]
 struct ArmTally {
     patterns: f64,
@@ -141,7 +133,6 @@ struct ArmTally {
 }
 
 impl<'a> Tally<'a> {
-    /// Progress of a run of some tasks, with the finished fits `done`.
     pub fn new(
         prepared: &'a PreparedStudy,
         tables: &'a StudyTables<'a>,
@@ -169,7 +160,6 @@ impl<'a> Tally<'a> {
         Self { prepared, tables, bar, start: Instant::now(), state }
     }
 
-    /// Records a finished fit: its rows go to the tables, and the bar advances.
     pub fn note(&self, trained: &Trained) {
         let rows = self.tables.rows(trained);
         let presented = self.prepared.presentations(trained);
@@ -185,7 +175,6 @@ impl<'a> Tally<'a> {
         self.bar.inc(1);
     }
 
-    /// Whether the tables could not be written.
     pub fn failed(&self) -> bool {
         self.state().error.is_some()
     }
@@ -214,7 +203,7 @@ impl ArmTally {
 }
 
 impl State {
-    /// "12.3 M presentations/s, 40 s left"; without estimators trained by epochs, "8.1 fits/s, 40 s left".
+    /// Formats "12.3 M presentations/s, 40 s left", or "8.1 fits/s, 40 s left" without epochs.
     fn rate_in_words(&self, seconds: f64) -> String {
         if self.arms.iter().any(|arm| arm.patterns > 0.0) {
             let rate = self.presented as f64 / seconds;
@@ -226,8 +215,8 @@ impl State {
         format!("{rate:.1} fits/s, {} left", progress::duration(left / rate))
     }
 
-    /// The remaining networks of an arm are assumed to cost as much as its finished ones. Without finished ones, they are scaled
-    /// from the other arms in proportion to the square of the number of patterns, which is roughly how the paper's arms grow.
+    /// An arm's remaining networks cost as much as its finished ones. Without any, the cost of
+    /// other arms is scaled by the square of the number of patterns.
     fn presentations_left(&self) -> f64 {
         let known: Vec<&ArmTally> =
             self.arms.iter().filter(|arm| arm.finished * arm.patterns > 0.0).collect();

@@ -1,4 +1,4 @@
-//! Shards of a study: the end of a single one, and the merge of all into the files of a single machine.
+//! Shards of a study: the end of one, and the merge of all into the files of a single machine.
 
 use super::fits;
 use super::{Arguments, Asked, time_in_words};
@@ -9,7 +9,6 @@ use palpate_mechanics::units::format_count;
 use palpate_studies::{AssemblyError, CheckpointError, RunFacts, Shard, ShardTables, Study, StudyTables};
 use std::path::Path;
 
-/// Content of `shard.json`.
 #[derive(serde::Serialize, serde::Deserialize)]
 struct ShardFile {
     shard: u64,
@@ -19,7 +18,7 @@ struct ShardFile {
     run: RunFacts,
 }
 
-/// Writes the facts of a shard, which mark it as finished, and prints them.
+/// Writes the facts of a shard, which mark it as finished.
 pub fn finish(
     shard: Shard,
     fits: usize,
@@ -77,7 +76,6 @@ fn read_facts(folder: &Path) -> Result<RunFacts, Failure> {
     Ok(file.run)
 }
 
-/// Complaint about shards that do not belong to one study.
 fn complaint(error: &AssemblyError, shards: &[ShardTables]) -> Complaint {
     let complaint = Complaint::new(error);
     match error {

@@ -1,18 +1,13 @@
-//! Variance of every contact with one more sensor, summed over the contacts eight at a time: the innermost loop of the searches.
+//! Variance of every contact with one more sensor, summed over blocks of eight contacts: the innermost loop
+//! of the searches.
 //!
-//! [`sum_up`] consists of loops over the lanes of one block, which compilers translate into vector instructions: two f64 per
-//! register on any x86-64, four where [`run_loops`] finds AVX2 at run time. Both do the same operations lane by lane in the same
-//! order, each rounded as in IEEE 754 and none fused. So the sums are equal to the last bit, and searches give the same layouts on
-//! every machine. (The logarithms of D-optimality are the C library's.)
-//!
-//! The limiting cost is one division and one root per contact: with AVX2 2.2 ns of a 2.5 GHz Xeon, at any width. AVX-512 is not
-//! faster, as it divides eight numbers in twice the time of four. Rows outside all caches take another 1.2 ns to fetch, so the
-//! search evaluates several states while a row is in the cache.
+//! [`sum_up`] loops over lanes, which compilers vectorize; [`run_loops`] selects AVX2 at run time. Both do
+//! equal operations in equal order without fusing, so sums and layouts are bitwise equal on all machines.
+//! (The logarithms of D-optimality are the C library's.)
 
 use super::{Block, LANES, packed};
 use palpate_numerics::simd::{Kernel, Simd, run_loops};
 
-/// Contacts of a layout, and the sensitivity of one more sensor to them.
 #[derive(Clone, Copy)]
 pub(super) struct Contacts<'a> {
     /// [entry of the covariance's lower triangle][block of contacts]
@@ -23,7 +18,7 @@ pub(super) struct Contacts<'a> {
     pub weights: &'a [Block],
 }
 
-/// Folds two values of each contact into sums: its variance of the position, and the factor by which a sensor shrinks det C.
+/// Folds two values of each contact into sums: position variance, and shrink factor of det C.
 pub(super) fn folded<const P: usize, const FIRST: usize, S: Sums>(contacts: Contacts, sums: &S) -> [f64; 2] {
     run_loops(Fold::<P, FIRST, S> { contacts, sums })
 }
@@ -82,7 +77,7 @@ fn sum_up<const P: usize, const FIRST: usize, S: Sums>(contacts: Contacts, sums:
     [S::join(&first), second.iter().sum()]
 }
 
-/// Terms of two sums, block by block. The second sum is the mean standard deviation if ties are to be broken.
+/// Two sums, block by block. The second is the mean standard deviation to break ties.
 pub(super) trait Sums {
     fn fold(&self, first: &mut Block, second: &mut Block, weight: &Block, variance: &Block, shrink: &Block);
 
@@ -91,13 +86,12 @@ pub(super) trait Sums {
     }
 }
 
-/// The mean standard deviation.
 pub(super) struct Mean;
-/// The largest variance.
+/// Largest variance.
 pub(super) struct Worst;
-/// The share of contacts with a variance above this one.
+/// Share of contacts with a larger variance.
 pub(super) struct Without(pub f64);
-/// The mean of −½·ln of the factors by which det C shrinks.
+/// Mean of −½·ln of the shrink factors of det C.
 pub(super) struct Shrinking;
 
 impl Sums for Mean {

@@ -5,7 +5,7 @@ fn row<const P: usize>(columns: [&[f64]; P]) -> Vec<Block> {
     columns.iter().flat_map(|column| padded(column)).collect()
 }
 
-/// Rows of a line with an unknown force, at 11 contacts, without any pattern.
+/// Rows of a line with an unknown force, at 11 contacts, without a pattern.
 fn rows() -> Vec<Vec<Block>> {
     let value = |i: usize, k: usize, p: usize| ((i * 7 + k * 3 + p) as f64 * 0.7).sin() * [2.0, 40.0][k];
     (0..5)

@@ -1,5 +1,3 @@
-//! Choice among candidates, and the time that it may take.
-
 use super::*;
 use crate::fit::Fit;
 use crate::fixtures::paper;
@@ -18,7 +16,7 @@ fn all_candidates(task: FitTask) -> Vec<Estimator> {
 fn estimators_that_are_not_done_in_time_are_stopped_and_left_out() {
     let bench = paper(5e-6, 2);
     let recording = bench.simulate(0);
-    // Time passes only while other estimators than the first are tried.
+    // Time passes only while later estimators are fitted.
     let done = AtomicUsize::new(0);
     let observe = |progress| {
         if let Progress::Counted { unit: "estimators", done: count, .. } = progress {
@@ -30,7 +28,7 @@ fn estimators_that_are_not_done_in_time_are_stopped_and_left_out() {
     let limit = TimeLimit { clock: &clock, seconds: 1.0 };
     let task = FitTask::new(&bench.setup, &recording).watch(Watch::new(&observe));
     let choice = choose(task, all_candidates(task), Some(limit)).unwrap();
-    // Fits that finish before the first check of the watch are not stopped.
+    // Fits that end ahead of the first check of the watch are not stopped.
     assert!(choice.tried.iter().any(|tried| tried.name == "influence"), "{:?}", choice.tried);
     assert_eq!(choice.tried.len() + choice.left_out.len(), Estimator::contenders(&bench.setup).len());
     for kind in ["network", "network-lm", "gaussian-process"] {
@@ -74,7 +72,8 @@ fn chooses_among_the_named_kinds_alone() {
     assert_eq!(only(&["digit"]).unwrap_err(), FitError::NoCandidate);
 }
 
-/// Presses of a line without a model at even places, by two forces each. Its four channels read the force to a power, times a bump each.
+/// Presses of a line without a model, by two forces at each position. Four channels read a power of the force
+/// times a bump.
 fn pressed_line(places: usize, power: f64) -> (Setup, Recording) {
     const LENGTH_M: f64 = 0.1;
     const COUNTS: f64 = 1000.0;
@@ -96,7 +95,7 @@ fn pressed_line(places: usize, power: f64) -> (Setup, Recording) {
 
 #[test]
 fn influence_chooses_its_structure_at_held_out_places() {
-    // Readings that follow the square root of the force contradict force-linear.
+    // Readings in proportion to the square root of the force contradict force-linear.
     let (setup, recording) = pressed_line(19, 0.5);
     let task = FitTask::new(&setup, &recording);
     let candidates = Estimator::Influence(Influence::default()).candidates(task).unwrap();

@@ -1,5 +1,4 @@
-//! Networks by Levenberg–Marquardt with Bayesian regularisation: the evidence sets the weight decay. An ensemble, with the curvature
-//! around each member, gives the uncertainty of an estimate.
+//! Ensembles of networks by Levenberg–Marquardt with Bayesian regularisation.
 
 mod training;
 
@@ -21,9 +20,7 @@ use palpate_numerics::{mean, mean_and_variance, normal_interval_95, symmetric_ei
 
 use training::{Training, jacobians};
 
-/// An ensemble of networks with tanh hidden layers and linear outputs, trained by Levenberg–Marquardt with Bayesian regularisation.
-///
-/// Outputs are the position and, where the bench's force is unknown but every row of the recording has one, the force.
+/// Ensemble with tanh hidden layers and linear outputs: position, and a recorded unknown force.
 ///
 /// ```
 /// use palpate_estimators::{arrangement::Training, fit::Fit, setup::Setup, network::LevenbergMarquardt};
@@ -38,11 +35,11 @@ use training::{Training, jacobians};
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LevenbergMarquardt {
-    /// Nodes of each hidden layer, input side first; at least 1 each.
+    /// Nodes of each hidden layer; at least 1 each.
     pub hidden: Vec<usize>,
-    /// Networks in the ensemble, at least 1. Twice as many are trained, and those with the greatest evidence are kept.
+    /// Networks, at least 1: the half of greatest evidence.
     pub ensemble: usize,
-    /// Each training is capped after this many iterations.
+    /// Cap of iterations.
     pub max_iterations: u32,
 }
 
@@ -52,41 +49,40 @@ impl Default for LevenbergMarquardt {
     }
 }
 
-/// A network learns from at most this many presses, drawn at random, each of an ensemble from others (Bühlmann and Yu,
-/// *Analyzing bagging*, Annals of Statistics 30, 2002). A step costs presses × weights², so that the information of more presses goes into the
-/// ensemble.
+/// Random presses per network (Bühlmann and Yu, *Analyzing bagging*, Annals of Statistics 30, 2002), as a
+/// step costs presses × weights².
 pub(crate) const MOST_PRESSES: usize = 1000;
 
-/// A recording that the networks cannot be fitted to.
+/// Recording that the networks do not suit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LevenbergMarquardtFitError {
-    /// Too few positions to learn from.
+    /// Too few positions.
     #[error(transparent)]
     Positions(#[from] TooFewPositions),
-    /// A layer or an ensemble of size 0.
+    /// Layer or ensemble of size 0.
     #[error("a network with {what} 0 cannot be trained; it must be at least 1")]
     Zero {
-        /// Name of the number that is 0.
+        /// Name of the number.
         what: &'static str,
     },
     /// Constant readings.
     #[error(transparent)]
     Features(#[from] NoFeatures),
-    /// Readings that differ by no more than noise.
+    /// Readings within noise.
     #[error(
         "the recording's readings differ by no more than noise, so a network cannot distinguish positions"
     )]
     Alike,
-    /// Every training diverged to numbers that are not finite.
+    /// Trainings that all diverged.
     #[error("all {trainings} trainings diverged, and no network has finite weights")]
     Diverged {
-        /// Number of trainings that were tried.
+        /// Number of trainings.
         trainings: usize,
     },
-    /// The recording's channels are not the setup's.
+    /// Channel mismatch.
     #[error(transparent)]
     Channels(#[from] ChannelMismatch),
-    /// The fit was stopped.
+    /// Cancelled.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
@@ -138,7 +134,7 @@ impl Fit for LevenbergMarquardt {
 }
 
 impl LevenbergMarquardt {
-    /// Trains twice the ensemble and keeps the half with the greatest evidence: a poor local minimum has little evidence.
+    /// Keeps the half of greatest evidence.
     fn ensemble(
         &self,
         training: &Training,
@@ -160,13 +156,11 @@ impl LevenbergMarquardt {
     }
 }
 
-/// Inputs and outputs of the networks for a recording; `None` for one without inputs for positions.
 pub(crate) fn network_size(setup: &Setup, recording: &Recording) -> Option<[usize; 2]> {
     let inputs = NetworkInputs::fit(setup, recording).ok()?;
     Some([inputs.axes.len(), outputs(setup, recording).len()])
 }
 
-/// The outputs of all rows: x, y where the surface has one, and the force where it is unknown and the presses have several forces.
 fn outputs(setup: &Setup, recording: &Recording) -> Vec<Vec<f64>> {
     let column = |of: fn(&Row) -> f64| recording.rows.iter().map(of).collect();
     let mut outputs = vec![column(|row| row.position.x_m)];
@@ -180,30 +174,25 @@ fn outputs(setup: &Setup, recording: &Recording) -> Vec<Vec<f64>> {
     outputs
 }
 
-/// Whitened inputs: the reading's load-invariant [`Features`] along their principal axes, each with mean 0 and variance 1 over the
-/// training recording.
+/// Whitened inputs: principal axes of load-invariant [`Features`], as only directions distinguish the ends of
+/// a beam.
 ///
-/// They are load-invariant even where the force is known: near a support the readings themselves shrink to 0, while their
-/// direction still distinguishes one end from the other.
-///
-/// Axes along which the recording has no more than noise are left out. Where the layout gives the noise of its channels, these are
-/// the axes with a variance below four times that of the noise; else those below 10⁻⁸ of the largest.
+/// Axes of noise are omitted: below four times the known noise variance, else below 10⁻⁸ of the largest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NetworkInputs {
-    /// From a reading to features with mean 0 and variance 1.
+    /// Features.
     pub features: Features,
-    /// A row an input: what each feature is multiplied by.
+    /// Factors of the features, a row per input.
     pub axes: Vec<Vec<f64>>,
 }
 
 impl NetworkInputs {
-    /// The inputs for a recording; an error where its readings differ by no more than noise.
     fn fit(setup: &Setup, recording: &Recording) -> Result<Self, NoFeatures> {
         let features = Features::fit(FeatureKind::load_invariant(setup, recording), recording)?;
         let mut inputs = Self { features, axes: Vec::new() };
         let noise = inputs.feature_noise(setup.layout(), recording);
-        // In units of the noise, where that is known, the noise has variance 1 along every axis.
+        // In units of a known noise, the noise has variance 1 along every axis.
         let unit = noise.clone().unwrap_or_else(|| Array1::ones(inputs.features.len()));
         let mut covariance = Array2::zeros((unit.len(), unit.len()));
         for row in &recording.rows {
@@ -219,8 +208,7 @@ impl NetworkInputs {
         Ok(inputs)
     }
 
-    /// Standard deviation of every feature's noise, where the layout gives the noise of its channels; to first order at
-    /// the mean norm: that of r/|r| is σ/|r|, that of ln |r| at most as large.
+    /// Noise to first order: σ/|r| for r/|r|, at most as large for ln |r|.
     fn feature_noise(&self, layout: &Layout, recording: &Recording) -> Option<Array1<f64>> {
         let Features { channels, features, .. } = &self.features;
         let sd = |scale: &ChannelScale| layout.sensors()[scale.channel].channel.reading_sd() / scale.divisor;
@@ -237,7 +225,7 @@ impl NetworkInputs {
         Some(features.iter().map(|feature| of_feature(feature.source) / norm / feature.spread).collect())
     }
 
-    /// The inputs for a reading.
+    /// Returns the inputs for a reading.
     pub fn values(&self, reading: &[f64]) -> Vec<f64> {
         let features = self.features.apply(reading);
         self.axes.iter().map(|axis| axis.iter().zip(&features).map(|(w, f)| w * f).sum()).collect()
@@ -253,35 +241,34 @@ impl NetworkInputs {
     }
 }
 
-/// Networks that locate; see [`LevenbergMarquardt`].
+/// Fitted [`LevenbergMarquardt`].
 ///
-/// The estimate is the mean of the members. Its covariance is that of the mixture: the covariance between members; the mean over
-/// them of g·A⁻¹·gᵀ, the uncertainty of the weights (g an output's derivatives by the weights, A the curvature); and
-/// the noise 1/β that training left. The 95 % interval is the mean ± 1.96 standard deviations.
+/// The covariance is that between members, plus the mean g·A⁻¹·gᵀ (g derivatives by the weights, A
+/// curvature), plus the noise 1/β.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LevenbergMarquardtLocator {
-    /// The surface.
+    /// Surface.
     pub extent: Extent,
-    /// The contact's force in newtons, where it is known.
+    /// Known force.
     pub force_n: Option<f64>,
-    /// From a reading to inputs.
+    /// Inputs.
     pub inputs: NetworkInputs,
-    /// Shape of every member.
+    /// Topology of members.
     pub topology: Topology,
-    /// Scales of the outputs: x, then y on a two-dimensional surface, then the force where it is an output.
+    /// Scales of x, y and an estimated force.
     pub scales: Vec<OutputScale>,
-    /// The networks, the one with the greatest evidence first.
+    /// Members by falling evidence.
     pub members: Vec<Member>,
 }
 
-/// An output a stands for mean + sd·a, in metres or newtons.
+/// Scale of an output a: mean + sd·a.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OutputScale {
-    /// Mean over the training recording.
+    /// Mean over the recording.
     pub mean: f64,
-    /// Standard deviation over the training recording; greater than 0.
+    /// Standard deviation over the recording; greater than 0.
     pub sd: f64,
 }
 
@@ -292,21 +279,21 @@ impl OutputScale {
     }
 }
 
-/// One network, with the curvature and noise for its uncertainty.
+/// Network with curvature and noise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Member {
-    /// Weights, in the order that [`Topology`] states.
+    /// Weights in the order of [`Topology`].
     pub weights: Vec<f64>,
-    /// L of the curvature A = L·Lᵀ of the training objective around the weights: rows of the lower triangle, one after the other.
+    /// Row-wise lower triangle of the curvature A = L·Lᵀ.
     pub curvature_factor: Vec<f64>,
-    /// Variance 1/β of each output's noise, in units of the output's own variance.
+    /// Scaled noise variance 1/β.
     pub noise: Vec<f64>,
-    /// γ, the number of weights that the recording determines.
+    /// Number γ of effective parameters.
     pub effective_parameters: f64,
-    /// Logarithm of the evidence, up to a constant that is the same for all members.
+    /// Log evidence, up to a constant.
     pub log_evidence: f64,
-    /// Iterations that training took.
+    /// Iterations of the training.
     pub iterations: u32,
 }
 
@@ -326,7 +313,6 @@ impl Member {
 }
 
 impl LevenbergMarquardtLocator {
-    /// Mean and covariance (a row an output) of the mixture, in units of the outputs' scales.
     fn predict(&self, inputs: &[f64]) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
         let count = self.topology.outputs();
         let inputs = ArrayView2::from_shape((1, inputs.len()), inputs).ok()?;
@@ -358,12 +344,11 @@ impl LevenbergMarquardtLocator {
         Some((mean, covariance))
     }
 
-    /// Number of the output that is the force, if one is.
     fn force_output(&self) -> Option<usize> {
         (self.scales.len() > self.extent.dimensions()).then(|| self.scales.len() - 1)
     }
 
-    /// True where its estimates have a force: a known one, or an output.
+    /// True where estimates have a force.
     pub fn tells_force(&self) -> bool {
         self.force_n.is_some() || self.force_output().is_some()
     }

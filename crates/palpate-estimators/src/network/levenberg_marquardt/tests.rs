@@ -1,4 +1,4 @@
-//! Derivatives against differences, evidence against a line's closed form, and the paper's beam.
+//! Derivatives against differences, evidence against a closed form, and the paper's beam.
 
 use ndarray::Array2;
 use palpate_numerics::watch::{Cancelled, Watch};
@@ -65,7 +65,6 @@ fn effective_parameters_are_the_weights_that_the_data_determine() {
     assert!((gammas[0] - 2.0).abs() < 1e-5, "{gammas:?}");
 }
 
-/// The paper's bench.
 fn setup(noise_sd: f64, force_n: Option<f64>) -> Setup {
     let beam = Beam::new(0.4, 0.04, 1.2e-3, 200e9).unwrap();
     let mut layout = Layout::even(SensorKind::Deflection, 8, 0.4);
@@ -97,7 +96,7 @@ fn even(repeats: usize) -> impl Iterator<Item = (f64, f64)> {
     (0..10).flat_map(move |i| std::iter::repeat_n((0.02 + 0.04 * f64::from(i), 3.0), repeats))
 }
 
-/// Mean error in metres and coverage of the 95 % interval at `from`…`to` mm.
+/// Mean error and coverage of the 95 % interval at `from`…`to` mm.
 fn judge(
     locator: &LevenbergMarquardtLocator,
     setup: &Setup,
@@ -124,7 +123,7 @@ fn fit(setup: &Setup, recording: &Recording) -> LevenbergMarquardtLocator {
     locator
 }
 
-/// The paper's network is off by 2.46 % of the length here.
+/// The paper's network has an error of 2.46 % of the length here.
 #[test]
 fn ten_clean_presses_of_the_papers_beam() {
     let setup = setup(0.0, Some(3.0));
@@ -199,8 +198,7 @@ fn what_cannot_be_trained_is_named() {
     assert!(Cancelled::caused(&stopped), "{stopped}");
 }
 
-/// scikit-learn's best, a Gaussian process, has a median of 0.565 mm and a mean of 0.844 mm on these folds; one network a fold, of two
-/// trained, comes near, and the default ensemble nearer.
+/// On these folds scikit-learn's best, a Gaussian process, has a median of 0.565 mm and a mean of 0.844 mm.
 #[test]
 fn a_real_strip_at_positions_held_out() {
     let Some((setup, recording)) = strip_recording("1d-water-1.5mm.csv") else { return };

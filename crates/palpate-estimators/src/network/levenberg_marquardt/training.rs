@@ -1,9 +1,9 @@
-//! Levenberg–Marquardt: Gauss–Newton steps with as much damping as they need (Levenberg 1944; Marquardt 1963; Hagan and Menhaj 1994), with weight
-//! decay and noise by the evidence framework (D. J. C. MacKay, Neural Computation 4 (1992), 448; with the Gauss–Newton curvature of F. D. Foresee and
-//! M. T. Hagan, ICNN 1997).
+//! Levenberg–Marquardt training (Levenberg 1944; Marquardt 1963; Hagan and Menhaj 1994) by the evidence
+//! framework (D. J. C. MacKay, Neural Computation 4 (1992), 448; with the Gauss–Newton curvature of F. D.
+//! Foresee and M. T. Hagan, ICNN 1997).
 //!
-//! Symbols: w the P weights, e_k the errors of output k over N rows and J_k their Jacobian; α weight decay, β_k one over
-//! the variance of output k's noise; A = Σ β_k·J_kᵀJ_k + α·1 the curvature; γ_k effective parameters.
+//! Symbols: w P weights, e_k errors of output k over N rows, J_k Jacobian, α weight decay, β_k inverse noise
+//! variance, A = Σ β_k·J_kᵀJ_k + α·1 curvature, γ_k effective parameters.
 //!
 //! ```text
 //! S   = ½ Σ β_k·|e_k|² + ½ α·|w|²
@@ -12,8 +12,7 @@
 //! ln evidence = −S − ½ ln det A + ½ P ln α + ½ N Σ ln β_k    (up to a constant)
 //! ```
 //!
-//! Derivatives by the weights: x inputs of a layer, a = f(W·x + b) its outputs, δ = ∂output/∂z for one of the network's outputs, sent
-//! back by δ_below = f′ ∘ Wᵀ·δ; ∂output/∂w_ij = δ_i·x_j.
+//! For a layer a = f(W·x + b) and δ = ∂output/∂z: δ_below = f′ ∘ Wᵀ·δ, ∂output/∂w_ij = δ_i·x_j.
 
 use super::Member;
 use crate::network::{Activation, Topology};
@@ -24,34 +23,29 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Training data of one network.
 pub(super) struct Training<'a> {
     pub(super) topology: &'a Topology,
-    /// A row a press, a column an input.
+    /// Presses × inputs.
     pub(super) inputs: Array2<f64>,
-    /// A row a press, a column an output, each with variance 1.
+    /// Presses × outputs, each of variance 1.
     pub(super) targets: Array2<f64>,
     pub(super) max_iterations: u32,
 }
 
-/// The errors at the weights where a step starts, and their derivatives.
 struct Linearisation {
     errors: Array2<f64>,
     jacobians: Vec<Array2<f64>>,
     products: Vec<Array2<f64>>,
 }
 
-/// Damping beyond which no step lowers the objective any more.
 const MOST_DAMPING: f64 = 1e12;
 
-/// Steps between two updates of the hyperparameters, which cost more than a step.
+/// Updates cost more than a step.
 const STEPS_A_UPDATE: u32 = 3;
 
-/// Relative change of the hyperparameters below which they have settled; three such updates in a row end training.
 const SETTLED: f64 = 0.01;
 
 impl Training<'_> {
-    /// The training of at most `most` presses, drawn at random.
     pub(super) fn subsampled(&self, most: usize, seed: u64) -> Self {
         let mut rows = random_order(self.inputs.nrows(), seed);
         rows.truncate(most);
@@ -63,10 +57,10 @@ impl Training<'_> {
         }
     }
 
-    /// Trains from the weights of a seed; `None` when a weight is not finite any more.
+    /// `None` for infinite weights.
     pub(super) fn run(&self, seed: u64, watch: Watch) -> Result<Option<Member>, Cancelled> {
         let mut weights = self.initial_weights(seed);
-        // Starting from little noise: with few rows, noise alone is another maximum of the evidence.
+        // Starts from little noise: with few rows, noise alone is another maximum of the evidence.
         let mut hyper = Hyperparameters { alpha: 0.01, betas: vec![1e4; self.topology.outputs()] };
         let (mut mu, mut iterations, mut calm) = (1.0, 0, 0);
         let mut here = self.linearise(&weights);
@@ -92,7 +86,7 @@ impl Training<'_> {
         Ok(self.finish(&weights, &here, &hyper, iterations))
     }
 
-    /// Weights so small that every node starts within the bend of its tanh: normal with variance 1/inputs of the node.
+    /// Normal of variance 1/inputs.
     fn initial_weights(&self, seed: u64) -> Array1<f64> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut weights = Vec::with_capacity(self.topology.weight_count());
@@ -115,7 +109,7 @@ impl Training<'_> {
         Linearisation { errors: &self.targets - &outputs, jacobians, products }
     }
 
-    /// w ← w + (A + μ·1)⁻¹·(Σ β_k·J_kᵀe_k − α·w), with μ raised until the objective falls; false where it cannot fall.
+    /// w ← w + (A + μ·1)⁻¹·(Σ β_k·J_kᵀe_k − α·w), μ raised until the objective falls; false at a minimum.
     fn step(
         &self,
         weights: &mut Array1<f64>,
@@ -179,11 +173,11 @@ pub(super) struct Hyperparameters {
     pub(super) betas: Vec<f64>,
 }
 
-/// Targets have variance 1; noise below this standard deviation counts as 0.
+/// Standard deviation that counts as 0.
 const LEAST_NOISE: f64 = 1e-7;
 
 impl Hyperparameters {
-    /// S for the squared errors of every output and |w|².
+    /// S.
     pub(super) fn objective(&self, squared_errors: &[f64], squared_weights: f64) -> f64 {
         let misfit: f64 = self.betas.iter().zip(squared_errors).map(|(beta, e)| beta * e).sum();
         0.5 * (misfit + self.alpha * squared_weights)
@@ -199,14 +193,13 @@ impl Hyperparameters {
         curvature
     }
 
-    /// γ_k from the factored A.
+    /// γ_k.
     pub(super) fn effective_parameters(&self, a: &Cholesky, products: &[Array2<f64>]) -> Vec<f64> {
         let inverse = a.inverse();
         let trace = |product: &Array2<f64>| (&inverse * product).sum();
         products.iter().zip(&self.betas).map(|(product, beta)| beta * trace(product)).collect()
     }
 
-    /// One step of the fixed point.
     pub(super) fn update(
         &mut self,
         gammas: &[f64],
@@ -217,13 +210,12 @@ impl Hyperparameters {
         let rows = rows as f64;
         self.alpha = (gammas.iter().sum::<f64>() / squared_weights).clamp(1e-8, 1e8);
         for ((beta, gamma), error) in self.betas.iter_mut().zip(gammas).zip(squared_errors) {
-            // A network that can fit every row exactly leaves no degrees of freedom for the noise; it keeps at least 1 % of the rows.
+            // An exact fit has 0 degrees of freedom for the noise; at least 1 % of the rows remain.
             let free = (rows - gamma).max(0.01 * rows);
             *beta = (free / error).min(LEAST_NOISE.powi(-2));
         }
     }
 
-    /// ln evidence, for S and the factored A.
     pub(super) fn log_evidence(&self, objective: f64, a: &Cholesky, rows: usize) -> f64 {
         let noise: f64 = self.betas.iter().map(|beta| beta.ln()).sum();
         -objective - 0.5 * a.log_determinant()
@@ -232,7 +224,6 @@ impl Hyperparameters {
     }
 }
 
-/// Outputs of every row of inputs, a row each.
 pub(super) fn outputs(topology: &Topology, weights: &[f64], inputs: &ArrayView2<f64>) -> Array2<f64> {
     let mut outputs = Array2::zeros((inputs.nrows(), topology.outputs()));
     let mut layers = Activations::new(topology);
@@ -243,7 +234,7 @@ pub(super) fn outputs(topology: &Topology, weights: &[f64], inputs: &ArrayView2<
     outputs
 }
 
-/// Outputs, and for every output the matrix of its derivatives: a row for each of the inputs' rows, a column a weight.
+/// Outputs and their Jacobians, rows × weights.
 pub(super) fn jacobians(
     topology: &Topology,
     weights: &[f64],
@@ -265,7 +256,6 @@ pub(super) fn jacobians(
     (outputs, jacobians)
 }
 
-/// Values of all layers: the inputs first, then each layer's outputs.
 struct Activations {
     layers: Vec<Vec<f64>>,
     delta: Vec<f64>,
@@ -296,7 +286,7 @@ impl Activations {
         }
     }
 
-    /// ∂ output `k` / ∂ weights at the last forward pass.
+    /// ∂ output `k` / ∂ weights.
     fn gradient(&mut self, topology: &Topology, weights: &[f64], k: usize, gradient: &mut [f64]) {
         self.delta.clear();
         self.delta.resize(topology.outputs(), 0.0);
@@ -328,7 +318,6 @@ impl Activations {
     }
 }
 
-/// f′ from the output a.
 fn slope(activation: Activation, a: f64) -> f64 {
     match activation {
         Activation::Logistic => a * (1.0 - a),

@@ -1,24 +1,19 @@
-//! A fresh presentation order for every lane and epoch, without branches.
+//! Random presentation orders, without branches.
 //!
-//! A uniform permutation of n patterns results from sorting n random keys. The keys have their pattern's number in their low bits, and a sorting
-//! network sorts all lanes at once: minimum and maximum are single instructions, where Fisher and Yates' exchanges would need a scattered store a
-//! lane and presentation. With n = 30 the 27 random bits of two keys coincide once in 300,000 epochs; then the lower number goes first, a negligible
-//! bias.
-//!
-//! Beyond [`MOST_SORTED`] patterns the keys have too few random bits, and the network's exchanges need more memory than the patterns. There Fisher
-//! and Yates' exchanges (Knuth, TAOCP vol. 2, 3.4.2, algorithm P) draw the order.
+//! A sorting network sorts random keys with the pattern's number in the low bits, in all lanes at once,
+//! without scattered stores. For n = 30 two keys coincide once in 300,000 epochs. Beyond [`MOST_SORTED`]
+//! Fisher and Yates' exchanges (Knuth, TAOCP vol. 2, 3.4.2, algorithm P) are used.
 
 use palpate_numerics::simd::LOOK_UP;
 
-/// Patterns up to which random keys are sorted: up to here a key has at least as many random bits as bits for the pattern's number.
+/// Up to here a key has at least as many random bits as bits of the number.
 const MOST_SORTED: usize = 1 << 16;
 
-/// The generator xoshiro128++ 1.0 (Blackman and Vigna, ACM TOMS 47, 2021), N streams side by side.
+/// xoshiro128++ 1.0 (Blackman and Vigna, ACM TOMS 47, 2021), N streams.
 #[derive(Clone, Debug)]
 pub(super) struct Streams<const N: usize>([[u32; N]; 4]);
 
 impl<const N: usize> Streams<N> {
-    /// All streams at the seed 0, to be seeded one by one.
     pub(super) fn unseeded() -> Self {
         let mut streams = Self([[0; N]; 4]);
         for lane in 0..N {
@@ -27,14 +22,12 @@ impl<const N: usize> Streams<N> {
         streams
     }
 
-    /// Puts a stream into one lane.
     pub(super) fn set(&mut self, lane: usize, stream: &Streams<1>) {
         for (words, word) in self.0.iter_mut().zip(&stream.0) {
             words[lane] = word[0];
         }
     }
 
-    /// The next 32 random bits of every stream.
     #[inline(always)]
     pub(super) fn next(&mut self) -> [u32; N] {
         let [s0, s1, s2, s3] = &mut self.0;
@@ -54,7 +47,7 @@ impl<const N: usize> Streams<N> {
 }
 
 impl Streams<1> {
-    /// The stream of a seed; SplitMix64 spreads the seed over the state, as the generator's authors advise.
+    /// SplitMix64 spreads the seed over the state, as the authors advise.
     pub(super) fn seeded(seed: u64) -> Self {
         let mut state = seed;
         let mut next = || {
@@ -68,13 +61,12 @@ impl Streams<1> {
         Self([[a as u32], [(a >> 32) as u32], [b as u32], [(b >> 32) as u32]])
     }
 
-    /// A number uniform in −half_width…half_width.
     pub(super) fn uniform(&mut self, half_width: f64) -> f64 {
         (f64::from(self.next()[0]) / f64::from(u32::MAX) * 2.0 - 1.0) * half_width
     }
 }
 
-/// The exchanges of Batcher's odd–even merge sort for n keys (Knuth, TAOCP vol. 3, 5.2.2, algorithm M).
+/// Batcher's odd–even merge sort (Knuth, TAOCP vol. 3, 5.2.2, algorithm M).
 fn exchanges(n: usize) -> Vec<(u32, u32)> {
     let mut list = Vec::new();
     if n < 2 {
@@ -98,24 +90,18 @@ fn exchanges(n: usize) -> Vec<(u32, u32)> {
     list
 }
 
-/// The length of a column with a number for each pattern: a power of two, and at least the length that vectors look up.
 pub(super) fn column_len(patterns: usize) -> usize {
     patterns.next_power_of_two().max(LOOK_UP)
 }
 
-/// Draws presentation orders of n patterns for N lanes.
 pub(super) struct OrderDrawer {
     patterns: usize,
-    /// Covers the pattern number in a key.
     mask: u32,
     method: Method,
 }
 
-/// Method of drawing a random permutation.
 enum Method {
-    /// By sorting random keys with a network of these exchanges.
     Sort(Vec<(u32, u32)>),
-    /// By exchanges with random partners.
     Shuffle,
 }
 
@@ -125,12 +111,11 @@ impl OrderDrawer {
         Self { patterns, mask: column_len(patterns) as u32 - 1, method }
     }
 
-    /// Fills `order` (one row a presentation, one column a lane) with a fresh permutation a lane. The low bits of a pick are the pattern's number, by
-    /// which patterns are looked up; the bits above it stay as they were drawn.
+    /// Only the low bits of a pick are the pattern's number.
     #[inline(always)]
     pub(super) fn draw<const N: usize>(&self, streams: &mut Streams<N>, order: &mut [[u32; N]]) {
         let Method::Sort(exchanges) = &self.method else { return shuffle(streams, order) };
-        // A copy of its own lets the generator's state stay in registers.
+        // A local copy lets the generator's state stay in registers.
         let mut local = streams.clone();
         for (pattern, row) in order.iter_mut().enumerate() {
             let random = local.next();
@@ -149,7 +134,6 @@ impl OrderDrawer {
         }
     }
 
-    /// [`OrderDrawer::draw`] for one stream, with its keys sorted by an ordinary sort.
     pub(super) fn draw_one(&self, stream: &mut Streams<1>, order: &mut [u32]) {
         if matches!(self.method, Method::Shuffle) {
             return shuffle(stream, order.as_chunks_mut().0);
@@ -168,7 +152,7 @@ impl OrderDrawer {
     }
 }
 
-/// Fisher and Yates' shuffle of every lane. A partner is the high word of a product, with a bias of at most one part in 2³²/n.
+/// A partner is the high word of a product, with a bias up to one part in 2³²/n.
 fn shuffle<const N: usize>(streams: &mut Streams<N>, order: &mut [[u32; N]]) {
     for (pattern, row) in order.iter_mut().enumerate() {
         *row = [pattern as u32; N];
@@ -242,7 +226,7 @@ mod tests {
                 at_end[1][order[9] as usize] += 1;
             }
             for counts in at_end {
-                // χ² with 9 degrees of freedom exceeds 27.9 once in a thousand times.
+                // χ² with 9 degrees of freedom exceeds 27.9 with probability 0.001.
                 let chi_squared: f64 = counts.iter().map(|n| f64::from(n - 2000).powi(2) / 2000.0).sum();
                 assert!(chi_squared < 27.9, "{counts:?}");
             }

@@ -1,11 +1,11 @@
-//! Every arithmetic gives the scalar twin's networks, to the last bit.
+//! Equality of every arithmetic with the scalar reference, to the last bit.
 
 use super::*;
 use crate::network::{Activation, Network, PresentationOrder, TrainingStatus};
 
 mod scalar;
 
-/// One network by the scalar twin, in the arithmetic that the lanes of this machine have.
+/// Network by the scalar reference, in the arithmetic of this machine's lanes.
 struct Twin<'a> {
     precision: Precision,
     task: &'a TrainingTask<'a>,
@@ -25,7 +25,7 @@ impl Kernel for Twin<'_> {
     }
 }
 
-/// y = sin x on a few points: enough to train on, and without a symmetry that would hide exchanged inputs.
+/// y = sin x on a few points, without a symmetry that would hide exchanged inputs.
 fn patterns(count: usize, inputs: usize, outputs: usize) -> TrainingSet {
     let value = |k: usize| 0.5 + 0.4 * (1.0 + k as f64 * 0.7).sin();
     TrainingSet {
@@ -152,7 +152,7 @@ fn one_update_goes_down_the_gradient_of_finite_differences() {
             train_one(Precision::F64, &task, 3, Watch::NONE).unwrap().weights
         };
         let (first, second) = (after(1), after(2));
-        // The first update has no momentum yet, the second repeats a share of it: Δw₂ = α Δw₁ − η ∂E/∂w.
+        // The first update has no momentum; the second repeats a share of it: Δw₂ = α Δw₁ − η ∂E/∂w.
         let before: Vec<f64> = {
             let mut stream = order::Streams::seeded(3);
             (0..topology.weight_count()).map(|_| stream.uniform(config.training.initial_weights)).collect()

@@ -7,14 +7,12 @@ use crate::recording::Warning;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
 
-/// A logger of four channels: its converter, its sensors' noise, and how often it repeats a value.
+/// Logger of four channels.
 #[derive(Clone, Copy)]
 struct Logger {
-    /// Resolution of the converter.
     step: f64,
-    /// Standard deviation of the sensors' noise.
     noise: f64,
-    /// Least and greatest number of rows of one value, channel by channel.
+    /// Least and greatest number of repeated rows, per channel.
     runs: [[usize; 2]; 4],
     contacts: usize,
     rows_per_contact: usize,
@@ -23,12 +21,12 @@ struct Logger {
 const FINE: Logger = Logger { step: 1e-3, noise: 0.5, runs: [[1, 1]; 4], contacts: 16, rows_per_contact: 12 };
 
 impl Logger {
-    /// Contacts 5 mm apart, every fourth one untouched; channels that differ in sensitivity.
+    /// Contacts 5 mm apart, every fourth untouched; channels of different sensitivity.
     fn record(&self, seed: u64) -> Recording {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let shift: f64 = rng.random();
         let (mut rows, mut left, mut values) = (Vec::new(), [0; 4], vec![0.0; 4]);
-        // Channels whose runs are alike repeat together, as those of one sensor board do.
+        // Channels with equal runs repeat together, as on one sensor board.
         for i in 0..self.contacts * self.rows_per_contact {
             let contact = i / self.rows_per_contact;
             let touched = !contact.is_multiple_of(4);
@@ -149,7 +147,7 @@ fn slow_channels_are_named() {
     let repeats = treated.provenance.repeats.clone().unwrap();
     assert_eq!((repeats.left_out, repeats.slow_channels), (0, vec!["raw_2".to_owned(), "raw_4".to_owned()]));
     insta::assert_snapshot!(treated.warning_lines().join("\n"));
-    // Two boards, both slower than the logger: rows that repeat both count once, and others still repeat one of them.
+    // Two boards slower than the logger: rows that repeat both count once, others still repeat one of them.
     let both = Logger { runs: [[2, 2], [7, 7], [2, 2], [7, 7]], ..FINE };
     let treated = both.treated(0);
     let repeats = treated.provenance.repeats.unwrap();

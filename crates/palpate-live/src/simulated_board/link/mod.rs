@@ -1,4 +1,4 @@
-//! The link of a simulated board: takes its frames, and brings lines that move its finger.
+//! Link of a simulated board.
 
 #[cfg(unix)]
 mod pty;
@@ -10,17 +10,16 @@ use std::net::{TcpListener, TcpStream, ToSocketAddrs, UdpSocket};
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// Most bytes that wait for a slow reader. Further frames are lost, as in the buffer of a board.
+/// Most waiting bytes, as in the buffer of a board; further frames are lost.
 const MOST_WAITING: usize = 1 << 16;
-/// Longest line that moves the finger.
 const LONGEST: usize = 1 << 10;
 
-/// URL of the link of a simulated board.
+/// URL of a link.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LinkUrl {
-    /// `-`: the standard output.
+    /// `-`: standard output.
     Stdout,
-    /// `pty`, or `pty:PATH` with a symbolic link to it at this path: a pseudo-terminal, which acts as a serial port.
+    /// `pty` or `pty:PATH` (link): pseudo-terminal as serial port.
     Pty(Option<PathBuf>),
     /// `tcp://:port`: one client at a time.
     Tcp(String),
@@ -30,21 +29,21 @@ pub enum LinkUrl {
     Mqtt(crate::sink::MqttUrl),
 }
 
-/// Text that is not a link.
+/// Error of a link URL.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{text}` is not a link of a board; links are `pty`, `pty:PATH`, `tcp://:7000`, `udp://host:7000`, `mqtt://host/topic` and `-`"
 )]
 pub struct LinkUrlError {
-    /// The text.
+    /// Text.
     pub text: String,
 }
 
-/// A link that cannot be opened.
+/// Error of an opened link.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot open {url}: {error}")]
 pub struct LinkError {
-    /// The link.
+    /// URL.
     pub url: LinkUrl,
     /// Cause.
     pub error: std::io::Error,
@@ -56,7 +55,7 @@ pub struct Link {
     name: String,
     waiting: Vec<u8>,
     received: Vec<u8>,
-    /// Frames that were lost because the link had no reader, or the reader was too slow.
+    /// Frames lost without a reader, or with a slow one.
     pub unread: u64,
 }
 
@@ -118,18 +117,18 @@ impl Link {
     /// Opens a link.
     ///
     /// # Errors
-    /// [`LinkError`] if the system refuses the link.
+    /// [`LinkError`].
     pub fn open(url: &LinkUrl) -> Result<Self, LinkError> {
         let (way, name) = open(url).map_err(|error| LinkError { url: url.clone(), error })?;
         Ok(Self { way, name, waiting: Vec::new(), received: Vec::new(), unread: 0 })
     }
 
-    /// Name for clients: the path of a pseudo-terminal, the address of a socket.
+    /// Name for clients: path or address.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The next message that a broker was lost or is there again; `None` for other links.
+    /// Next message of a lost or restored broker.
     pub fn news(&self) -> Option<String> {
         match &self.way {
             Way::Mqtt(publisher) => publisher.news(),
@@ -140,7 +139,7 @@ impl Link {
     /// Sends a frame without waiting for the reader.
     ///
     /// # Errors
-    /// The link has failed, as stdout does once its reader has gone.
+    /// A failed link, such as stdout without a reader.
     pub fn send(&mut self, frame: &[u8]) -> std::io::Result<()> {
         match &mut self.way {
             Way::Stdout(out) => {
@@ -174,7 +173,6 @@ impl Link {
         Ok(())
     }
 
-    /// Writes as many of the waiting bytes as the other end takes now.
     fn push(&mut self) {
         while !self.waiting.is_empty() {
             let written = match &mut self.way {
@@ -200,11 +198,10 @@ impl Link {
         }
     }
 
-    /// Disconnects, as if the cable of the board were pulled: hangs up a TCP client, or closes a pseudo-terminal and opens another. Other links have no
-    /// connection.
+    /// Simulates a pulled cable: closes a TCP connection, or replaces a pseudo-terminal.
     ///
     /// # Errors
-    /// The system gives no other pseudo-terminal.
+    /// The system provides no pseudo-terminal.
     pub fn disconnect(&mut self) -> std::io::Result<()> {
         self.drop_client();
         #[cfg(unix)]
@@ -215,7 +212,7 @@ impl Link {
         Ok(())
     }
 
-    /// The bytes from the other end; `None` without a client.
+    /// Received bytes; `None` without a client.
     ///
     /// # Errors
     /// A client that cannot be accepted.
@@ -228,7 +225,7 @@ impl Link {
         Ok(is_there.then(|| std::mem::take(&mut self.received)))
     }
 
-    /// The whole lines from the other end.
+    /// Received lines.
     pub fn lines(&mut self) -> Vec<String> {
         self.receive();
         let Some(end) = self.received.iter().rposition(|byte| *byte == b'\n') else { return Vec::new() };
@@ -262,7 +259,6 @@ impl Link {
     }
 }
 
-/// Accepts the next client, unless one is connected.
 fn accept(listener: &TcpListener, client: &mut Option<TcpStream>) -> std::io::Result<()> {
     if client.is_none()
         && let Ok((stream, _)) = listener.accept()

@@ -1,4 +1,4 @@
-//! A pseudo-terminal, which looks like a serial port.
+//! Pseudo-terminal as serial port.
 
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use nix::pty::openpty;
@@ -8,11 +8,10 @@ use std::fs::File;
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 
-/// A pseudo-terminal without line discipline.
 pub struct Pty {
-    /// The board's end, which does not block.
+    /// Non-blocking end of the board.
     pub master: File,
-    /// The other end, kept open so that the pair outlives its readers.
+    /// Kept open, so that the pair outlives its readers.
     slave: OwnedFd,
     link: Option<PathBuf>,
 }
@@ -25,14 +24,13 @@ impl Pty {
         Ok(own)
     }
 
-    /// Replaces the pair, which hangs up the readers of the old one.
+    /// Replaces the pair, which hangs up the readers.
     pub fn reopen(&mut self) -> std::io::Result<()> {
         let (master, slave) = pair()?;
         (self.master, self.slave) = (master, slave);
         self.lead_here()
     }
 
-    /// Path of the other end.
     pub fn name(&self) -> String {
         match &self.link {
             Some(link) => link.display().to_string(),
@@ -40,7 +38,7 @@ impl Pty {
         }
     }
 
-    /// Makes the symbolic link lead to the other end. Replaces an existing link, but no other file.
+    /// Replaces a link, but no other file.
     fn lead_here(&self) -> std::io::Result<()> {
         let Some(link) = &self.link else { return Ok(()) };
         if is_link(link) {

@@ -1,4 +1,4 @@
-//! An MQTT client that publishes frames.
+//! MQTT publisher of frames.
 
 use crate::broker::explain;
 use crate::sink::MqttUrl;
@@ -6,16 +6,12 @@ use rumqttc::{Client, Connection, ConnectionError, Event, Packet, QoS};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
-/// Most messages that wait for the broker.
 const WAITING: usize = 256;
-/// Time between two attempts to reach the broker.
 const AGAIN_AFTER: Duration = Duration::from_millis(500);
 
-/// A publisher on a topic.
 pub struct Publisher {
     client: Client,
     topic: String,
-    /// Messages that the broker was lost or is there again.
     news: Receiver<String>,
 }
 
@@ -30,18 +26,16 @@ impl Publisher {
         Ok(Self { client, topic: url.topic.clone(), news })
     }
 
-    /// The next message that the broker was lost or is there again.
     pub fn news(&self) -> Option<String> {
         self.news.try_recv().ok()
     }
 
-    /// Publishes a frame; false if too many wait for the broker.
+    /// Publishes a frame; false if too many wait.
     pub fn publish(&self, frame: &[u8]) -> bool {
         self.client.try_publish(&self.topic, QoS::AtMostOnce, false, frame).is_ok()
     }
 }
 
-/// Keeps the connection until the client has gone, and reports once when the broker is lost and when it is there again.
 fn drive(mut connection: Connection, broker: &str, tell: &Sender<String>) {
     let mut is_away = false;
     for event in connection.iter() {
@@ -61,7 +55,7 @@ fn drive(mut connection: Connection, broker: &str, tell: &Sender<String>) {
             }
             Ok(_) => continue,
         };
-        // The receiver is gone once the board has ended.
+        // The receiver is dropped at the end of the board.
         let _ = tell.send(words);
     }
 }

@@ -1,4 +1,4 @@
-//! WebSocket server for Foxglove: readings, estimates and events as in a recording, and the contact on its surface for the 3D panel.
+//! WebSocket server for Foxglove, with the topics of a recording and a 3D scene.
 
 mod scene;
 
@@ -21,32 +21,30 @@ use serde_json::{Map, Value, json};
 use std::net::SocketAddr;
 use std::sync::Arc;
 
-/// Topic of the contact on its surface.
+/// Topic of the scene.
 pub const CONTACT: &str = "/contact";
 
-/// A server for Foxglove's app. It only sends: clients cannot affect the session.
+/// Server for Foxglove; clients cannot affect the session.
 pub struct FoxgloveServer {
     context: Arc<Context>,
     address: SocketAddr,
-    /// `None` once the server is being stopped.
     handle: Option<WebSocketServerHandle>,
 }
 
-/// An address at which a server cannot listen.
+/// Error of an address.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot listen at {address} for Foxglove: {error}")]
 pub struct FoxgloveServerError {
-    /// The address.
+    /// Address.
     pub address: SocketAddr,
-    /// Cause.
     error: FoxgloveError,
 }
 
 impl FoxgloveServer {
-    /// Starts a server at an address; port 0 selects a free port. The topics exist once a session has a sink of this server.
+    /// Starts a server; port 0 selects a free port.
     ///
     /// # Errors
-    /// [`FoxgloveServerError`] for an address that is in use, or is not one of this machine.
+    /// The address is in use, or not of this machine.
     ///
     /// # Panics
     /// In an asynchronous context, because the server has its own runtime.
@@ -63,15 +61,15 @@ impl FoxgloveServer {
         Ok(Self { context, address, handle: Some(handle) })
     }
 
-    /// The address at which the server listens.
+    /// Address.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// A sink of samples of these channels. A client that reads too slowly loses the oldest of 1,024 messages.
+    /// Returns a sink. A slow client loses the oldest of 1,024 messages.
     ///
     /// # Errors
-    /// A topic that the library refuses because it has no encoding. Every topic has one, so no error is expected.
+    /// A topic without an encoding, which is not expected.
     pub fn sink(&self, channels: &[Channel], extent: Extent) -> std::io::Result<FoxgloveSink> {
         let json = |topic, name: &str, schema: Vec<u8>| {
             ChannelBuilder::new(topic)
@@ -96,7 +94,8 @@ impl FoxgloveServer {
 impl Drop for FoxgloveServer {
     fn drop(&mut self) {
         let Some(handle) = self.handle.take() else { return };
-        // The wait is in a separate thread, because it is refused in an asynchronous context, and the server may be dropped in one.
+        // Waits in a separate thread, because an asynchronous context refuses it, and the server may be
+        // dropped in one.
         let wait = move || handle.stop().wait_blocking();
         if let Ok(thread) = std::thread::Builder::new().name("foxglove-end".to_owned()).spawn(wait) {
             let _ = thread.join();
@@ -104,7 +103,7 @@ impl Drop for FoxgloveServer {
     }
 }
 
-/// Schema of readings with the names of all channels, so the app offers each of them for a plot.
+/// Foxglove offers each channel for plots.
 fn reading_schema(channels: &[Channel]) -> Vec<u8> {
     let values: Map<String, Value> =
         channels.iter().map(|channel| (channel.name.clone(), json!({ "type": "number" }))).collect();
@@ -123,14 +122,13 @@ fn reading_schema(channels: &[Channel]) -> Vec<u8> {
     schema.to_string().into_bytes()
 }
 
-/// Sends a session to the clients of a [`FoxgloveServer`].
+/// Sink of a [`FoxgloveServer`].
 pub struct FoxgloveSink {
     reading: Arc<RawChannel>,
     estimate: Arc<RawChannel>,
     event: Arc<RawChannel>,
     contact: foxglove::Channel<SceneUpdate>,
     scene: Scene,
-    /// Name and factor of each channel.
     channels: Vec<(String, f64)>,
     extent: Extent,
 }
@@ -157,7 +155,6 @@ impl Sink for FoxgloveSink {
     }
 }
 
-/// Sends a record to the subscribers of its topic. Without subscribers the record is not made.
 fn log<T: Serialize>(topic: &RawChannel, at_ns: u64, record: impl FnOnce() -> T) {
     if !topic.has_sinks() {
         return;

@@ -1,4 +1,5 @@
-//! The contact on its surface for Foxglove's 3D panel: in metres in the frame `surface`, x along, y across, z out of the surface.
+//! Surface and contact for the 3D panel of Foxglove: metres in the frame `surface`, x along, y across, z out
+//! of it.
 
 use foxglove::messages::scene_entity_deletion::Type;
 use foxglove::messages::{
@@ -16,11 +17,10 @@ const GREY: Color = Color { r: 0.6, g: 0.6, b: 0.65, a: 0.6 };
 const LOCATED: Color = Color { r: 0.1, g: 0.65, b: 0.3, a: 1.0 };
 const DOUBTED: Color = Color { r: 0.95, g: 0.6, b: 0.1, a: 1.0 };
 
-/// Drawing of a surface.
 pub struct Scene {
-    /// Length, width and thickness of the slab that represents the surface. The width of a line and all thicknesses are chosen to be visible.
+    /// Size of the slab; the width of a line and the thickness are arbitrary.
     size_m: [f64; 3],
-    /// y of the lower edge of the slab. The axis of a line is at 0.
+    /// The axis of a line is at 0.
     edge_y_m: f64,
 }
 
@@ -34,8 +34,7 @@ impl Scene {
         Self { size_m: [length_m, width_m, 0.01 * length_m.max(width_m)], edge_y_m }
     }
 
-    /// Update with the surface, repeated for later subscribers, and the contact as an arrow with the tip at its place. The arrow is green for a located
-    /// contact. It is amber if other places explain the reading as well, or no place explains it.
+    /// Surface, repeated for later subscribers, and contact as an arrow: green if located, else amber.
     pub fn update(&self, estimate: &Estimate, unix_ns: u64) -> SceneUpdate {
         let color = match estimate.status {
             Status::NoContact => None,

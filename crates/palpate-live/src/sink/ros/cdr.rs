@@ -1,9 +1,10 @@
-//! ROS 2 messages as bytes: Common Data Representation (CDR, OMG DDSI-RTPS 2.5, section 10), version 1, little-endian.
+//! ROS 2 messages in Common Data Representation (CDR, OMG DDSI-RTPS 2.5, section 10), version 1,
+//! little-endian.
 
 /// Encapsulation: plain CDR, little-endian, no options.
 const HEAD: [u8; 4] = [0x00, 0x01, 0x00, 0x00];
 
-/// `geometry_msgs/msg/PointStamped`: header, then x, y, z in metres.
+/// `geometry_msgs/msg/PointStamped`.
 pub fn point_stamped(unix_ns: u64, frame: &str, point_m: [f64; 3]) -> Vec<u8> {
     let mut writer = Writer::new();
     writer.header(unix_ns, frame);
@@ -11,7 +12,7 @@ pub fn point_stamped(unix_ns: u64, frame: &str, point_m: [f64; 3]) -> Vec<u8> {
     writer.bytes
 }
 
-/// `geometry_msgs/msg/WrenchStamped`: header, then force in N and torque in N·m, x, y, z each.
+/// `geometry_msgs/msg/WrenchStamped`.
 pub fn wrench_stamped(unix_ns: u64, frame: &str, force_n: [f64; 3], torque_nm: [f64; 3]) -> Vec<u8> {
     let mut writer = Writer::new();
     writer.header(unix_ns, frame);
@@ -36,7 +37,7 @@ impl Writer {
         Self { bytes: HEAD.to_vec() }
     }
 
-    /// `std_msgs/msg/Header`: seconds as i32, nanoseconds as u32, name of the frame.
+    /// `std_msgs/msg/Header`.
     fn header(&mut self, unix_ns: u64, frame: &str) {
         // The time of ROS ends in January 2038.
         let seconds = i32::try_from(unix_ns / 1_000_000_000).unwrap_or(i32::MAX);
@@ -45,7 +46,7 @@ impl Writer {
         self.string(frame);
     }
 
-    /// Length including the final zero, text, zero.
+    /// The length includes the final zero.
     fn string(&mut self, text: &str) {
         self.four((text.len() as u32 + 1).to_le_bytes());
         self.bytes.extend(text.as_bytes());
@@ -62,7 +63,7 @@ impl Writer {
         self.bytes.extend(bytes);
     }
 
-    /// Appends zeros up to a multiple of `size` after the encapsulation.
+    /// Pads relative to the end of the encapsulation.
     fn align(&mut self, size: usize) {
         let end = HEAD.len() + (self.bytes.len() - HEAD.len()).next_multiple_of(size);
         self.bytes.resize(end, 0);

@@ -1,4 +1,4 @@
-//! Keys, tokens and attachments by which nodes of `rmw_zenoh_cpp` find and receive messages (its docs/design.md).
+//! Keys, tokens and attachments of `rmw_zenoh_cpp` (its docs/design.md).
 
 use super::url::RosUrl;
 
@@ -9,16 +9,16 @@ pub enum Topic {
     Contact,
     /// `NAME/wrench`, `geometry_msgs/msg/WrenchStamped`.
     Wrench,
-    /// `NAME/estimate`, `std_msgs/msg/String`: JSON.
+    /// `NAME/estimate`, `std_msgs/msg/String` with JSON.
     Estimate,
-    /// `NAME/event`, `std_msgs/msg/String`: JSON.
+    /// `NAME/event`, `std_msgs/msg/String` with JSON.
     Event,
 }
 
-/// All topics, in the order of [`Topic`].
+/// All topics in order.
 pub const TOPICS: [Topic; 4] = [Topic::Contact, Topic::Wrench, Topic::Estimate, Topic::Event];
 
-/// Quality of service in a token: the default of ROS 2 (reliable, volatile, keep last), with depth 10.
+/// Default of ROS 2 (reliable, volatile, keep last), depth 10.
 const QUALITY: &str = "::,10:,:,:,,";
 
 impl Topic {
@@ -32,7 +32,7 @@ impl Topic {
         }
     }
 
-    /// ROS 2 type of the messages.
+    /// Type of the messages.
     pub const fn message_type(self) -> &'static str {
         match self {
             Self::Contact => "geometry_msgs/msg/PointStamped",
@@ -41,7 +41,7 @@ impl Topic {
         }
     }
 
-    /// Hash of the definition of the type (REP 2016), which is part of the key: a node with another definition of the type receives no messages.
+    /// Hash of the type (REP 2016); nodes with another hash receive no messages.
     pub const fn type_hash(self) -> &'static str {
         match self {
             Self::Contact => "RIHS01_4c0296af86e01e562e9e0405d138a01537247580076c58ea38d7923ac1045897",
@@ -52,42 +52,42 @@ impl Topic {
         }
     }
 
-    /// Type and hash in the form for keys: `geometry_msgs::msg::dds_::PointStamped_/RIHS01_…`.
+    /// `geometry_msgs::msg::dds_::PointStamped_/RIHS01_…`.
     fn type_in_key(self) -> String {
         let (package, name) = self.message_type().rsplit_once('/').unwrap_or_default();
         format!("{}::dds_::{name}_/{}", package.replace('/', "::"), self.type_hash())
     }
 }
 
-/// Keys of a session's node and publishers.
+/// Keys of a node and its publishers.
 #[derive(Clone, Debug)]
 pub struct Keys<'a> {
     /// Domain, names and frame.
     pub url: &'a RosUrl,
-    /// Identity of the Zenoh session: as text, and as little-endian bytes.
+    /// Identity of the Zenoh session as text and little-endian bytes.
     pub session: (String, [u8; 16]),
 }
 
 impl Keys<'_> {
-    /// Key of the messages of a topic.
+    /// Returns the key of a topic.
     pub fn data(&self, topic: Topic) -> String {
         let RosUrl { domain, name, .. } = self.url;
         format!("{domain}/{name}/{}/{}", topic.name(), topic.type_in_key())
     }
 
-    /// Token that announces the node to the graph of ROS.
+    /// Token of the node.
     pub fn node_token(&self) -> String {
         self.token("0/0/NN")
     }
 
-    /// Token that announces the publisher of a topic to the graph of ROS.
+    /// Returns the token of a publisher.
     pub fn publisher_token(&self, topic: Topic) -> String {
         let topic_name = format!("%{}%{}", self.url.name.replace('/', "%"), topic.name());
         let token = self.token(&format!("0/{}/MP", entity(topic)));
         format!("{token}/{topic_name}/{}/{QUALITY}", topic.type_in_key())
     }
 
-    /// Attachment of a message: its number from 1, its time, and the identity of its publisher.
+    /// Returns the attachment of a message: number from 1, time, and identity of the publisher.
     pub fn attachment(&self, topic: Topic, number: i64, unix_ns: u64) -> [u8; 33] {
         let mut publisher = self.session.1;
         // The identities of a session's publishers differ in this byte, which a shorter identity uses last.
@@ -100,7 +100,8 @@ impl Keys<'_> {
         bytes
     }
 
-    /// `@ros2_lv/DOMAIN/SESSION/NODE/ENTITY/KIND/ENCLAVE/NAMESPACE/NODE NAME`, with `%` for every `/` within a part.
+    /// `@ros2_lv/DOMAIN/SESSION/NODE/ENTITY/KIND/ENCLAVE/NAMESPACE/NODE NAME`, with `%` for `/` within a
+    /// part.
     fn token(&self, entity: &str) -> String {
         let RosUrl { domain, name, .. } = self.url;
         let (namespace, node) = name.rsplit_once('/').unwrap_or(("", name));
@@ -108,7 +109,7 @@ impl Keys<'_> {
     }
 }
 
-/// Number of the publisher of a topic in its session; the node has 0.
+/// The node has 0.
 const fn entity(topic: Topic) -> u8 {
     topic as u8 + 1
 }

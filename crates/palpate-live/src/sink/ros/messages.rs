@@ -1,7 +1,7 @@
-//! Messages that a session publishes for a sample or an event.
+//! ROS messages of samples and events.
 //!
-//! Points and wrenches have no status, and their receivers act on them. They are therefore published only for reliable estimates: a point and its
-//! wrench for a located contact, a wrench of zero for an untouched surface. Ambiguous estimates, and those outside the model, are in `estimate` alone.
+//! Points and wrenches have no status. Therefore they exist for located contacts only, with a zero wrench for
+//! an untouched surface.
 
 use super::cdr;
 use super::keys::Topic;
@@ -12,21 +12,21 @@ use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::surface::Extent;
 use serde::Serialize;
 
-/// A message that is ready to be published.
+/// A message for publication.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RosMessage {
     /// Topic.
     pub topic: Topic,
-    /// Time of the reading or the event, in ns since 1970-01-01 00:00 UTC.
+    /// Time in ns since 1970-01-01 00:00 UTC.
     pub unix_ns: u64,
-    /// The message in CDR, with its encapsulation.
+    /// CDR with its encapsulation.
     pub cdr: Vec<u8>,
 }
 
-/// Messages of an output, in the order of [`Topic`].
+/// Returns the messages of an output.
 ///
-/// The origin of the frame is the left end of a line, on its axis, or the lower left corner of a plane. x points along, y across to the left, z out of
-/// the surface. The force of a pressing contact is along −z; the torque is about the origin.
+/// The origin is the left end or the lower left corner; x points along, y across, z out of the surface.
+/// Contacts press along −z; the torque is about the origin.
 pub fn messages(output: &Output, frame: &str, channels: &[Channel], extent: Extent) -> Vec<RosMessage> {
     match output {
         Output::Sample(sample) => of_sample(sample, frame, &SampleRecord::new(sample, channels, extent)),
@@ -49,7 +49,7 @@ fn of_sample(sample: &Sample, frame: &str, record: &SampleRecord) -> Vec<RosMess
     all.into_iter().flatten().collect()
 }
 
-/// Force in N and torque about the origin in N·m of all contacts; `None` for a contact that is not located, or an unknown force.
+/// Force in N and torque in N·m, if known.
 fn wrench(estimate: &Estimate) -> Option<([f64; 3], [f64; 3])> {
     match estimate.status {
         Status::NoContact => Some(([0.0; 3], [0.0; 3])),
@@ -71,7 +71,7 @@ fn wrench(estimate: &Estimate) -> Option<([f64; 3], [f64; 3])> {
 }
 
 fn text(topic: Topic, unix_ns: u64, record: &impl Serialize) -> Option<RosMessage> {
-    // Serialization cannot fail: records have no maps with keys other than text, and no other value that JSON refuses.
+    // Serialization cannot fail: records have only keys of text, and no value that JSON rejects.
     let json = serde_json::to_string(record).ok()?;
     Some(RosMessage { topic, unix_ns, cdr: cdr::string(&json) })
 }

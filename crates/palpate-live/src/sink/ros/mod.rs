@@ -1,6 +1,4 @@
-//! ROS 2 through Zenoh: points, wrenches, estimates and events as messages for nodes of `rmw_zenoh_cpp`, without an installation of ROS.
-//!
-//! The messages, their bytes and their keys are made without Zenoh; only `RosSink`, of the feature `ros`, needs it.
+//! ROS 2 messages through Zenoh, for `rmw_zenoh_cpp`. Only `RosSink`, of the feature `ros`, needs Zenoh.
 
 mod cdr;
 mod keys;

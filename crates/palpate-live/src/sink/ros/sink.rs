@@ -1,4 +1,4 @@
-//! The sink over a Zenoh session.
+//! Sink over a Zenoh session.
 
 use super::keys::{Keys, TOPICS};
 use super::messages::messages;
@@ -18,18 +18,12 @@ use zenoh::pubsub::Publisher;
 use zenoh::qos::CongestionControl;
 use zenoh::{Config, Session, Wait};
 
-/// Most batches that wait for the router; further ones are counted as lost.
 const WAITING: usize = 1024;
-/// Time between two attempts to reach a router.
 const AGAIN_AFTER: Duration = Duration::from_millis(500);
-/// Time between two checks that the router is available.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
-/// Longest wait at the end until the connection is closed.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Publishes points, wrenches, estimates and events to the nodes of ROS 2 behind a Zenoh router.
-///
-/// While the router is away, samples and events are counted as lost, and the sink tries to reach it again.
+/// Sink for ROS 2 nodes behind a Zenoh router, with reconnection.
 pub struct RosSink {
     to: Option<SyncSender<Arc<Batch>>>,
     lost: Arc<AtomicU64>,
@@ -37,10 +31,10 @@ pub struct RosSink {
 }
 
 impl RosSink {
-    /// A ROS node on a router, which may become available later. Problems are reported to the session through `reports`.
+    /// Creates a node on a router, which may be offline; `reports` receives problems.
     ///
     /// # Errors
-    /// The system gives no thread for the sink.
+    /// The system provides no thread.
     pub fn new(
         url: &RosUrl,
         channels: &[Channel],
@@ -62,7 +56,7 @@ impl RosSink {
         Ok(Self { to: Some(to), lost, thread: Some(thread) })
     }
 
-    /// Number of samples and events that were not published.
+    /// Number of lost samples and events.
     pub fn lost(&self) -> u64 {
         self.lost.load(Ordering::Relaxed)
     }
@@ -98,11 +92,9 @@ struct Worker {
     extent: Extent,
     reports: SyncSender<Input>,
     lost: Arc<AtomicU64>,
-    /// True if the router was available at the last check; `None` before the first.
     was_there: Option<bool>,
 }
 
-/// The session has ended.
 struct Ended;
 
 impl Worker {
@@ -113,11 +105,10 @@ impl Worker {
             Ok(mut node) => self.publish(batches, &session, &mut node),
             Err(_) => self.report("refuses the topics; no message is published"),
         }
-        // This informs other ROS nodes at once that this node has gone.
+        // Other ROS nodes then see the end of this node at once.
         let _ = session.close().wait();
     }
 
-    /// Opens a session with the router, as soon as it is there.
     fn connect(&mut self, batches: &Receiver<Arc<Batch>>) -> Result<Session, Ended> {
         loop {
             let opened = config(&self.url.router).and_then(|config| zenoh::open(config).wait());
@@ -170,7 +161,6 @@ impl Worker {
         self.lost.fetch_add(batch.outputs.len() as u64, Ordering::Relaxed);
     }
 
-    /// Reports a change in the availability of the router.
     fn look(&mut self, is_there: bool) {
         match (self.was_there, is_there) {
             (Some(false), true) => self.report("is there again"),
@@ -186,7 +176,7 @@ impl Worker {
     }
 }
 
-/// Configuration of a client of one router, without a search for others.
+/// Without a search for other routers.
 fn config(router: &str) -> zenoh::Result<Config> {
     let mut config = Config::default();
     config.insert_json5("mode", "\"client\"")?;
@@ -196,19 +186,17 @@ fn config(router: &str) -> zenoh::Result<Config> {
     Ok(config)
 }
 
-/// True while a router is connected, or another session that accepts clients.
+/// True with a router, or a peer that accepts clients.
 fn has_router(session: &Session) -> bool {
     let info = session.info();
     info.routers_zid().wait().next().is_some() || info.peers_zid().wait().next().is_some()
 }
 
-/// A ROS node with one publisher per topic.
 struct Node<'a> {
     keys: Keys<'a>,
     publishers: Vec<Publisher<'static>>,
-    /// Number of the last message of each publisher.
     numbers: [i64; TOPICS.len()],
-    /// Announce the node and the publishers to the graph of ROS as long as the tokens exist.
+    /// Announce node and publishers.
     _tokens: Vec<LivelinessToken>,
 }
 

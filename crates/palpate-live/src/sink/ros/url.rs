@@ -1,38 +1,35 @@
-//! A Zenoh router, and the names by which ROS knows a session.
+//! URLs of Zenoh routers for ROS.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// A Zenoh router, and the names by which ROS knows a session: `tcp/host:7447?domain=0&name=palpate&frame=surface`.
+/// Zenoh router and ROS names: `tcp/host:7447?domain=0&name=palpate&frame=surface`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RosUrl {
-    /// The router, as Zenoh names it: `tcp/host:7447`.
+    /// Router: `tcp/host:7447`.
     pub router: String,
-    /// Domain of ROS, 0 to 232; 0 by default.
+    /// ROS domain, 0 to 232.
     pub domain: u8,
-    /// Namespace and name of the node, under which the topics are; `palpate` unless it is said.
+    /// Namespace and name of the node; the default is `palpate`.
     pub name: String,
-    /// Frame of points and wrenches; `surface` unless it is said.
+    /// Frame of points and wrenches; the default is `surface`.
     pub frame: String,
 }
 
-/// Text that is no [`RosUrl`].
+/// Error of a URL.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{text}` is not a Zenoh router with names of ROS, as in `tcp/host:7447?domain=0&name=palpate&frame=surface`: {problem}"
 )]
 pub struct RosUrlError {
-    /// The text.
+    /// Text.
     pub text: String,
     /// Problem.
     pub problem: &'static str,
 }
 
-/// Port of Zenoh routers.
 const PORT: u16 = 7447;
-/// Greatest domain of ROS.
 const GREATEST_DOMAIN: u8 = 232;
-/// Most bytes of a name or frame.
 const LONGEST: usize = 200;
 
 impl FromStr for RosUrl {
@@ -43,7 +40,6 @@ impl FromStr for RosUrl {
     }
 }
 
-/// Router, domain, name and frame; without those that are not said otherwise.
 impl fmt::Display for RosUrl {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { router, domain, name, frame } = self;
@@ -76,7 +72,7 @@ fn parse(text: &str) -> Result<RosUrl, &'static str> {
 
 fn router_of(text: &str) -> Result<String, &'static str> {
     let address = text.strip_prefix("tcp/").ok_or("it does not begin with tcp/")?;
-    // The colons of an address of IPv6 are within brackets.
+    // The colons of an IPv6 address are within brackets.
     let (host, port) = match address.rsplit_once(':') {
         Some((host, port)) if !port.ends_with(']') => (
             host,

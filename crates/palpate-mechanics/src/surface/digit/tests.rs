@@ -15,7 +15,7 @@ fn three_newtons_at_the_tip_strain_the_clamp_by_3593_microstrain() {
     let digit = digit(ForceDirection::Vertical);
     assert_eq!(format!("{:.4}", digit.characteristic_force_n()), "1.4468");
     assert_eq!(format!("{:.0}", strain(&digit, 0.0, 0.12, 3.0) * 1e6), "-3593");
-    // In the linear theory the bar does not get shorter as it bends.
+    // In the linear theory bending does not shorten the lever.
     let linear = 3.0 * digit.influence(SensorKind::Strain, Position::along(0.0), Position::along(0.12));
     assert_eq!(format!("{:.0}", linear * 1e6), "-4320");
 }

@@ -3,7 +3,8 @@ use ForceDirection::{Normal, Vertical};
 use proptest::prelude::*;
 use std::f64::consts::PI;
 
-/// ψ, x and the drop at the end of a finger of length and stiffness 1, by Runge–Kutta steps of the exact equations from the clamp.
+/// ψ, curvature, x and drop at the end of a finger of length and stiffness 1, by Runge–Kutta steps from the
+/// clamp.
 fn shot(force_angle: f64, load: f64, curvature_at_clamp: f64) -> [f64; 4] {
     const STEPS: usize = 4000;
     let slope = |[angle, curvature, _, _]: [f64; 4]| {
@@ -30,7 +31,7 @@ fn unit(direction: ForceDirection, load: f64) -> Elastica {
 
 #[test]
 fn a_vertical_end_load_bends_as_the_tables_say() {
-    // Mattiasson 1981: deflection w/L, shortening u/L and turn of the tip.
+    // Mattiasson 1981: deflection w/L, shortening u/L and rotation of the tip.
     let table = [
         (1.0, 0.30172, 0.05643, 0.46135),
         (2.0, 0.49346, 0.16064, 0.78175),

@@ -17,13 +17,12 @@ fn load(x_m: f64, force_n: f64) -> Contact {
     Contact { position: Position::along(x_m), force_n }
 }
 
-/// Every kind of sensor, with reactions at both supports.
 const SENSORS: [(SensorKind, f64); 5] =
     [(Deflection, 0.15), (Slope, 0.3), (Strain, 0.11), (Reaction, 0.0), (Reaction, 0.4)];
 
-/// Frýba's equation 1.31 and its limits, of the undamped beam at rest. A load W enters at x = 0 and t = 0 with the
-/// constant speed v: w = w₀·Σ_k sin(kπx/l)·(sin kωt − (α/k)·sin ω_k·t)/(k²·(k² − α²)), with w₀ = 2·W·l³/(π⁴·E·I),
-/// α = v/v_cr and ω = πv/l.
+/// Frýba's equation 1.31 for an undamped beam at rest. A load W enters at x = 0 and t = 0 with constant speed
+/// v: w = w₀·Σ_k sin(kπx/l)·(sin kωt − (α/k)·sin ω_k·t)/(k²·(k² − α²)), w₀ = 2·W·l³/(π⁴·E·I), α = v/v_cr, ω =
+/// πv/l.
 fn fryba(beam: &ModalBeam, speed: f64, x_m: f64, t: f64, force_n: f64) -> f64 {
     let alpha = speed / beam.critical_speed_m_per_s();
     let l = beam.beam.length_m();
@@ -86,8 +85,7 @@ fn a_creeping_load_reads_as_the_closed_form_does() {
 
 #[test]
 fn a_sensors_modes_add_up_to_its_static_reading() {
-    // Unloaded at once from balance: before the modes move, they contain the deflection under the load, except for the
-    // neglected modes.
+    // After a sudden release the modes contain the static deflection, except for the neglected modes.
     let beam = paper(0.0);
     for ((kind, x_m), bound) in SENSORS.into_iter().zip([1e-7, 1e-5, 3e-3, 3e-3, 3e-3]) {
         let (sensor, before) = (Position::along(x_m), load(0.17, 3.0));
@@ -108,7 +106,7 @@ fn energy_j(ModalResponse { beam, modes, .. }: &ModalResponse) -> f64 {
     modes.iter().enumerate().map(energy).sum()
 }
 
-/// The power that the loads put into the modes, in watts: Σ W_j·ẇ(a_j).
+/// Power of the loads on the modes, in watts: Σ W_j·ẇ(a_j).
 fn power_w(ModalResponse { beam, modes, loads, .. }: &ModalResponse) -> f64 {
     let speed_at = |x_m: f64| -> f64 {
         modes.iter().enumerate().map(|(i, mode)| (beam.wave_number(i + 1) * x_m).sin() * mode.velocity).sum()

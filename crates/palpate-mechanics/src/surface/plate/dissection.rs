@@ -1,22 +1,15 @@
-//! The order of elimination of the nodes of a grid: nested dissection, after George, *Nested dissection of a regular
-//! finite element mesh* (1973).
-//!
-//! A line of nodes separates a grid into two halves that do not touch. Each half is eliminated first, by the same rule, and
-//! the line last, so that the halves stay uncoupled.
+//! Nested dissection (George, *Nested dissection of a regular finite element mesh*, 1973).
 
 use std::collections::HashMap;
 
-/// Blocks of at most this many nodes are not divided further.
 const LEAF_NODES: usize = 12;
 
-/// A rectangle of nodes: from inclusive, to exclusive.
 #[derive(Clone, Copy)]
 struct Block {
     columns: (usize, usize),
     rows: (usize, usize),
 }
 
-/// Column and row of every node of a grid of `columns` × `rows`, in the order of elimination.
 pub(super) fn nested_dissection(columns: usize, rows: usize) -> Vec<(usize, usize)> {
     let mut order = Vec::with_capacity(columns * rows);
     dissect(Block { columns: (0, columns), rows: (0, rows) }, &mut order);
@@ -42,10 +35,7 @@ fn dissect(block: Block, order: &mut Vec<(usize, usize)>) {
     }
 }
 
-/// Number of pairs of nodes that the factor couples in that order of elimination, including each node with itself.
-///
-/// An upper bound: a block's nodes couple with each other and with all nodes that surround it. A float, because it is also
-/// computed for grids that are refused as too large.
+/// Upper bound of node pairs in the factor; a float, as meshes may be too large.
 pub(super) fn coupled_pairs(columns: usize, rows: usize) -> f64 {
     Couplings::default().count(Surrounded {
         wide: columns,
@@ -57,7 +47,7 @@ pub(super) fn coupled_pairs(columns: usize, rows: usize) -> f64 {
     })
 }
 
-/// A block's size, and 1 for each side with neighbouring nodes, otherwise 0.
+/// Size of a block, and 1 for each side with neighbours.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 struct Surrounded {
     wide: usize,
@@ -69,14 +59,12 @@ struct Surrounded {
 }
 
 impl Surrounded {
-    /// Nodes around the block.
     fn surrounding_nodes(self) -> usize {
         let Self { wide, high, left, right, below, above } = self;
         (wide + left + right) * (high + below + above) - wide * high
     }
 }
 
-/// The couplings of blocks that were counted already; there are few different ones.
 #[derive(Default)]
 struct Couplings(HashMap<Surrounded, f64>);
 
@@ -104,7 +92,6 @@ impl Couplings {
     }
 }
 
-/// Pairs among `nodes` nodes that are eliminated together, and pairs between them and `around` later ones.
 fn eliminated(nodes: usize, around: usize) -> f64 {
     let (nodes, around) = (nodes as f64, around as f64);
     nodes * (nodes + 1.0) / 2.0 + nodes * around

@@ -1,4 +1,4 @@
-//! The influence function of one sensor on a plate, and the full scale of influences.
+//! Influence functions of sensors on a plate, and full scales.
 
 use super::mesh::{Derivative, Mesh, NODE_DEGREES};
 use super::solved::{Functional, Solved, TOGETHER};
@@ -8,21 +8,14 @@ use crate::sensing::SensorKind;
 use crate::surface::{ContactLoad, InfluenceFunction, ReadingsByContact};
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// An influence function as bicubic patches over the plate, with their own degrees of freedom.
-///
-/// By Maxwell's and Betti's reciprocity it is the deflection of the plate under the sensor's functional as a load:
-/// the reading of u = K⁻¹·f is s'·K⁻¹·f = (K⁻¹·s)'·f, and a downward unit force is −1 times the shape functions there.
+/// Influence function as bicubic patches: the deflection under the sensor's functional s as a load, s'·K⁻¹·f
+/// = (K⁻¹·s)'·f (Maxwell, Betti). A downward unit force is −1 times the shape functions.
 pub(super) struct PlateInfluence {
     mesh: Mesh,
     degrees: Vec<f64>,
 }
 
 impl PlateInfluence {
-    /// The influence functions of sensors of this `kind` at `sensors`; 0 everywhere for a raw channel, or a reaction
-    /// without a support.
-    ///
-    /// # Errors
-    /// [`Cancelled`] when the watch stopped the solutions.
     pub fn of_all(
         spec: &PlateSpec,
         solved: &Solved,
@@ -46,17 +39,14 @@ impl PlateInfluence {
         Ok(degrees.map(|degrees| Self { mesh: solved.mesh, degrees }).collect())
     }
 
-    /// Memory of this influence function, in bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(self.degrees.as_slice())
     }
 
-    /// Memory of one influence function of a plate, in bytes.
     pub fn bytes_of(spec: &PlateSpec) -> f64 {
         (size_of::<f64>() * Mesh::new(spec.extent(), spec.elements).degrees()) as f64
     }
 
-    /// The largest magnitude at the nodes.
     pub fn largest(&self) -> f64 {
         let deflections = self.degrees.iter().step_by(NODE_DEGREES);
         deflections.fold(0.0, |largest: f64, value| largest.max(value.abs()))
@@ -74,7 +64,6 @@ impl InfluenceFunction for PlateInfluence {
     }
 }
 
-/// Influence function of a plate without a solution: NaN everywhere.
 pub(super) struct NotANumber;
 
 impl InfluenceFunction for NotANumber {
@@ -91,7 +80,7 @@ fn weights(mesh: &Mesh, at: Position, of: Derivative) -> Functional {
     mesh.weights(mesh.locate(at), of).to_vec()
 }
 
-/// ∂²w/∂x², which jumps from element to element: on a boundary, the mean of both sides.
+/// ∂²w/∂x², the mean of both sides between elements.
 fn curvature(mesh: &Mesh, at: Position) -> Functional {
     let place = mesh.locate(at);
     let here = mesh.weights(place, Derivative::XX);
@@ -104,13 +93,9 @@ fn curvature(mesh: &Mesh, at: Position) -> Functional {
     }
 }
 
-/// Dependence of a sensor's reading on a load.
 enum Reads {
-    /// A functional of the plate's shape under the load, positive upward as the shape functions are, times a factor.
     Shape(Functional, f64),
-    /// A function of the force's position, as degrees of freedom; independent of the bending.
     Contact(Vec<f64>),
-    /// 0 for every load.
     Nothing,
 }
 
@@ -120,30 +105,26 @@ impl Reads {
         match kind {
             SensorKind::Deflection => Self::Shape(weights(mesh, at, Derivative::None), -1.0),
             SensorKind::Slope => Self::Shape(weights(mesh, at, Derivative::X), -1.0),
-            // Strain on the lower face, t/2 below the middle, is (t/2)·∂²w/∂x²: a plate that is hollow above is stretched
-            // below.
+            // Strain on the lower face is (t/2)·∂²w/∂x², with w upward.
             SensorKind::Strain => Self::Shape(curvature(mesh, at), -0.5 * spec.thickness_m),
             SensorKind::Reaction => Self::reaction(spec, solved, at),
             SensorKind::Raw => Self::Nothing,
         }
     }
 
-    /// The force of the support at `at` on the plate, positive upward.
     fn reaction(spec: &PlateSpec, solved: &Solved, at: Position) -> Self {
         let force = spec::support_at(spec, at).and_then(|support| solved.reaction(support));
         force.map_or(Self::Nothing, Self::Contact)
     }
 }
 
-/// Readings of many sensors under loads at contacts: by Maxwell's and Betti's reciprocity s'·K⁻¹·f also results from applying the
-/// functionals s of the sensors to the shape K⁻¹·f.
+/// Readings by contact: the sensors' functionals of the shape K⁻¹·f.
 pub(super) struct PlateReadings<'a> {
     solved: &'a Solved,
     sensors: Vec<Reads>,
 }
 
 impl<'a> PlateReadings<'a> {
-    /// Memory of one sensor, in bytes: a functional of the four nodes around it.
     pub const BYTES_EACH: f64 = (size_of::<Reads>() + 4 * NODE_DEGREES * size_of::<(usize, f64)>()) as f64;
 
     pub fn new(spec: &PlateSpec, solved: &'a Solved, sensors: &[(SensorKind, Position)]) -> Self {
@@ -190,18 +171,15 @@ impl ReadingsByContact for PlateReadings<'_> {
     }
 }
 
-/// Largest number of elements along the longer side of the mesh for full scales.
 const ELEMENTS: usize = 24;
 
-/// Sensors along each side of the grid for full scales, the edges included.
 const SENSORS: usize = 9;
 
-/// Largest magnitude of the influence of each kind of sensor, in the order of [`SensorKind::ALL`]; NaN when the plate's equations
-/// have no solution.
+/// Largest influence of each of [`SensorKind::ALL`]; NaN without a solution.
 pub(super) fn full_scales(spec: &PlateSpec) -> [f64; SensorKind::ALL.len()] {
     let mut coarse = PlateSpec { elements: spec.elements.min(ELEMENTS), ..spec.clone() };
     if spec::check(&coarse).is_err() {
-        // Only the finer mesh can distinguish the supports.
+        // Only the finer mesh separates the supports.
         coarse.elements = spec.elements;
     }
     match Solved::new(&coarse, Watch::NONE) {

@@ -1,4 +1,4 @@
-//! Cache of a plate's latest influence functions: the folds and seeds of a fit all request the same ones.
+//! Cache of influence functions, for the folds and seeds of a fit.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -7,23 +7,18 @@ use super::influence::PlateInfluence;
 use crate::contact::Position;
 use crate::sensing::SensorKind;
 
-/// Largest memory of the cache, in bytes: the functions of a fit on the default mesh take 100 MB.
+/// A fit on the default mesh takes 100 MB.
 const MOST_BYTES: usize = 128_000_000;
 
-/// Kind and position of a sensor, by their bits.
 type Key = (SensorKind, [u64; 2]);
 
-/// Influence functions by sensor.
 #[derive(Default)]
 pub(super) struct Kept {
     functions: Mutex<HashMap<Key, Arc<PlateInfluence>>>,
 }
 
 impl Kept {
-    /// The influence functions of some sensors. `solve` is called once for all that are not cached.
-    ///
-    /// # Errors
-    /// The error of `solve`; the cache is then unchanged.
+    /// Returns functions, by one call of `solve` for missing ones.
     pub fn of_all<E>(
         &self,
         kind: SensorKind,
@@ -46,7 +41,6 @@ impl Kept {
         Ok(sensors.iter().filter_map(|at| found.get(&key(at)).cloned()).collect())
     }
 
-    /// Caches functions; when there are then too many, drops all earlier ones.
     fn keep(&self, solved: &[(Key, Arc<PlateInfluence>)]) {
         let bytes = |functions: &mut dyn Iterator<Item = &Arc<PlateInfluence>>| -> usize {
             functions.map(|function| function.bytes()).sum()

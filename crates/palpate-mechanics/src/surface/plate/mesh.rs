@@ -1,45 +1,31 @@
-//! The grid of elements on a plate: the element of a position, the shape functions, and the stiffness of one element.
+//! Mesh and elements (Bogner, Fox and Schmit, *The generation of inter-element-compatible stiffness and mass
+//! matrices by the use of interpolation formulas*, 1965).
 //!
-//! Every node has four degrees of freedom, in this order: w, h_x·∂w/∂x, h_y·∂w/∂y, h_x·h_y·∂²w/∂x∂y, with the
-//! deflection w and the sides h_x, h_y of an element. All are lengths, so they are of one size.
-//!
-//! Symbols of the shape functions: ξ place within an element, 0 to 1; N₀, N₁ the cubic Hermite functions of value and slope
-//! at ξ = 0, N₂, N₃ those at ξ = 1. The element's stiffness is that of Bogner, Fox and Schmit, *The generation of
-//! inter-element-compatible stiffness and mass matrices by the use of interpolation formulas* (1965).
+//! Degrees of freedom of a node, in metres: w, h_x·∂w/∂x, h_y·∂w/∂y, h_x·h_y·∂²w/∂x∂y, with element sides
+//! h_x, h_y. Shape functions on 0 ≤ ξ ≤ 1: cubic Hermite functions N₀, N₁ of value and slope at 0, N₂, N₃ at
+//! 1.
 
 use crate::contact::Position;
 use crate::surface::Extent;
 
-/// Degrees of freedom of a node.
 pub(super) const NODE_DEGREES: usize = 4;
 
-/// Equal rectangular elements in `across` columns along x and `up` rows along y.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Mesh {
-    /// Elements along x; at least 1.
     pub across: usize,
-    /// Elements along y; at least 1.
     pub up: usize,
-    /// Side h_x of an element along x, in metres.
     pub side_x_m: f64,
-    /// Side h_y of an element along y, in metres.
     pub side_y_m: f64,
 }
 
-/// A derivative of the deflection: how often along x and how often along y.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Derivative {
-    /// w itself.
     None,
-    /// ∂w/∂x.
     X,
-    /// ∂w/∂y.
     Y,
-    /// ∂²w/∂x².
     XX,
 }
 
-/// Point of the mesh: an element, and where in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct MeshPoint {
     column: usize,
@@ -48,12 +34,10 @@ pub(super) struct MeshPoint {
     eta: f64,
 }
 
-/// Smallest number of elements along a side: with a single element, a plate clamped all round could not bend.
 const FEWEST: usize = 4;
 
 impl Mesh {
-    /// A mesh with `elements` along the longer side of `extent`. The shorter side gets as many as keep the elements from being longer
-    /// than wide, but at least four.
+    /// Square elements, or shorter along the shorter side.
     pub fn new(extent: Extent, elements: usize) -> Self {
         let (length_m, width_m) = (extent.length_m(), extent.width_m().unwrap_or(extent.length_m()));
         let side_m = length_m.max(width_m) / elements as f64;
@@ -62,35 +46,29 @@ impl Mesh {
         Self { across, up, side_x_m: length_m / across as f64, side_y_m: width_m / up as f64 }
     }
 
-    /// Nodes along x and along y.
     pub fn nodes(&self) -> (usize, usize) {
         (self.across + 1, self.up + 1)
     }
 
-    /// Number of degrees of freedom of all nodes together.
     pub fn degrees(&self) -> usize {
         NODE_DEGREES * (self.across + 1) * (self.up + 1)
     }
 
-    /// The first degree of freedom of a node.
     pub fn first_degree(&self, column: usize, row: usize) -> usize {
         NODE_DEGREES * (row * (self.across + 1) + column)
     }
 
-    /// The point of the mesh at `position`. Off the plate, the polynomial of the nearest element is continued.
     pub fn locate(&self, position: Position) -> MeshPoint {
         let (column, xi) = element_at(position.x_m / self.side_x_m, self.across);
         let (row, eta) = element_at(position.y_m / self.side_y_m, self.up);
         MeshPoint { column, row, xi, eta }
     }
 
-    /// The point as part of the previous element along x, when it lies on the boundary between two elements.
     pub fn seen_from_before(&self, point: MeshPoint) -> Option<MeshPoint> {
         let on_boundary = point.xi.abs() < 1e-9 && point.column > 0;
         on_boundary.then(|| MeshPoint { column: point.column - 1, xi: 1.0 + point.xi, ..point })
     }
 
-    /// The value of the derivative `of` at `point` when the degrees of freedom are `degrees`.
     #[inline]
     pub fn value(&self, degrees: &[f64], point: MeshPoint, of: Derivative) -> f64 {
         let (along_x, along_y) = self.factors(point, of);
@@ -106,7 +84,6 @@ impl Mesh {
         sum
     }
 
-    /// Factor of each degree of freedom in the derivative `of` at `point`: pairs of degree and factor.
     pub fn weights(&self, point: MeshPoint, of: Derivative) -> [(usize, f64); 16] {
         let (along_x, along_y) = self.factors(point, of);
         std::array::from_fn(|i| {
@@ -116,7 +93,6 @@ impl Mesh {
         })
     }
 
-    /// The factors of the shape functions along x and along y.
     #[inline]
     fn factors(&self, point: MeshPoint, of: Derivative) -> (Four, Four) {
         let MeshPoint { xi, eta, .. } = point;
@@ -130,7 +106,6 @@ impl Mesh {
     }
 }
 
-/// The element at a distance of `steps` elements, among `count`, and the place within it.
 #[inline]
 fn element_at(steps: f64, count: usize) -> (usize, f64) {
     // Conversion from a float saturates, so that no position is out of bounds.
@@ -138,30 +113,25 @@ fn element_at(steps: f64, count: usize) -> (usize, f64) {
     (element, steps - element as f64)
 }
 
-/// The four shape functions, or a derivative of them, at one ξ.
 type Four = [f64; 4];
 
-/// Integrals over the element of products of two functions or of their derivatives.
 type Integrals = [[f64; 4]; 4];
 
-/// N₀ … N₃ at `xi`.
 fn values(xi: f64) -> Four {
     let (square, cube) = (xi * xi, xi * xi * xi);
     [1.0 - 3.0 * square + 2.0 * cube, xi - 2.0 * square + cube, 3.0 * square - 2.0 * cube, cube - square]
 }
 
-/// First derivatives of N₀ … N₃ with respect to ξ.
 fn slopes(xi: f64) -> Four {
     let square = xi * xi;
     [6.0 * square - 6.0 * xi, 1.0 - 4.0 * xi + 3.0 * square, 6.0 * xi - 6.0 * square, 3.0 * square - 2.0 * xi]
 }
 
-/// Second derivatives of N₀ … N₃ with respect to ξ.
 fn curvatures(xi: f64) -> Four {
     [12.0 * xi - 6.0, 6.0 * xi - 4.0, 6.0 - 12.0 * xi, 6.0 * xi - 2.0]
 }
 
-/// ∫ fᵢ·gⱼ dξ from 0 to 1, by the rule of Gauss and Legendre with four points, exact up to degree 7.
+/// ∫ fᵢ·gⱼ dξ, exact up to degree 7.
 fn integrals(f: fn(f64) -> Four, g: fn(f64) -> Four) -> Integrals {
     let mut sums = Integrals::default();
     for (xi, weight) in gauss_points() {
@@ -175,8 +145,7 @@ fn integrals(f: fn(f64) -> Four, g: fn(f64) -> Four) -> Integrals {
     sums
 }
 
-/// Places and weights of the rule with four points on the unit interval (Abramowitz and Stegun, 25.4.30):
-/// x² = (3 ∓ 2·√(6/5))/7, weights (18 ± √30)/36 on −1 … 1.
+/// Four Gauss points and weights on the unit interval (Abramowitz and Stegun, 25.4.30).
 fn gauss_points() -> [(f64, f64); 4] {
     let (root, spread) = (30f64.sqrt(), 2.0 * (6.0f64 / 5.0).sqrt());
     let near = (((3.0 - spread) / 7.0).sqrt(), (18.0 + root) / 36.0);
@@ -185,16 +154,11 @@ fn gauss_points() -> [(f64, f64); 4] {
     [at(-far.0, far.1), at(-near.0, near.1), at(near.0, near.1), at(far.0, far.1)]
 }
 
-/// The second derivative of the bending energy of an element with respect to its 16 degrees of freedom.
-///
-/// Degree 4·y + x belongs to the product of the Hermite functions x along the length and y along the width, so x = 2·a + p
-/// is the end a and the order of derivative p.
+/// Index 4·y + x is the product of Hermite functions x and y; x = 2·a + p is end a and derivative p.
 pub(super) type ElementStiffness = [[f64; 16]; 16];
 
-/// D·∬ (w_xx² + w_yy² + 2·ν·w_xx·w_yy + 2·(1 − ν)·w_xy²)/2 as a quadratic form (Timoshenko and Woinowsky-Krieger, *Theory
-/// of Plates and Shells*, 2nd ed., eq. 117).
-///
-/// `rigidity_nm`: flexural rigidity D in N·m; `poissons_ratio`: ν. In units of newtons per metre.
+/// D·∬ (w_xx² + w_yy² + 2·ν·w_xx·w_yy + 2·(1 − ν)·w_xy²)/2 as a quadratic form (Timoshenko and
+/// Woinowsky-Krieger, *Theory of Plates and Shells*, 2nd ed., eq. 117).
 pub(super) fn element_stiffness(mesh: &Mesh, rigidity_nm: f64, poissons_ratio: f64) -> ElementStiffness {
     let (h_x, h_y, nu) = (mesh.side_x_m, mesh.side_y_m, poissons_ratio);
     let bent = integrals(curvatures, curvatures);

@@ -1,6 +1,4 @@
-//! Rectangular plates after Kirchhoff, solved by the elements of Bogner, Fox and Schmit.
-//!
-//! A plate needs one factor, and each sensor one solution: by reciprocity this solution is the influence function over the whole plate.
+//! Rectangular Kirchhoff plates by the elements of Bogner, Fox and Schmit.
 
 mod dissection;
 mod influence;
@@ -29,11 +27,10 @@ use kept::Kept;
 use palpate_numerics::watch::{Cancelled, Watch};
 use solved::Solved;
 
-/// A checked plate. The equations are factored at the first request, once for all clones.
+/// A checked plate, factored at the first request, once for all clones.
 ///
-/// Computed values are not part of the plate: they are neither compared nor written to files. They stay in memory as long as a
-/// clone lives: some 85 MB for a square plate of the default mesh, 230 MB for 200 × 200 elements, and up to 128 MB of the influence
-/// functions that were requested.
+/// Computed values are neither compared nor serialised. They take 85 MB for the default mesh, and up to 128
+/// MB of influence functions.
 ///
 /// ```
 /// use palpate_mechanics::contact::Position;
@@ -63,31 +60,29 @@ pub struct Plate {
     computed: Arc<Computed>,
 }
 
-/// Cache of a plate's factored equations, influence functions and full scales.
 #[derive(Default)]
 struct Computed {
     solved: OnceLock<Result<Solved, Unsolvable>>,
-    /// Locked while one thread solves and the others wait.
+    /// One thread solves, others wait.
     solving: Mutex<()>,
     influences: Kept,
     full_scales: OnceLock<[f64; SensorKind::ALL.len()]>,
 }
 
 impl Plate {
-    /// A plate from its description, which is checked.
+    /// Creates a plate.
     ///
     /// # Errors
-    /// [`PlateError`] when the plate cannot be computed: a value out of range, an unconstrained rigid motion, a mesh too large.
+    /// [`PlateError`] for the first fault.
     pub fn new(spec: PlateSpec) -> Result<Self, PlateError> {
         spec::check(&spec)?;
         Ok(Self { spec, computed: Arc::default() })
     }
 
-    /// A plate of this length, width and thickness, in metres, Young's modulus, in pascals, and Poisson's ratio, simply
-    /// supported along all edges.
+    /// Creates a plate with simply supported edges.
     ///
     /// # Errors
-    /// [`PlateError`] as for [`Plate::new`].
+    /// As [`Plate::new`].
     pub fn simply_supported(
         (length_m, width_m): (f64, f64),
         thickness_m: f64,
@@ -106,10 +101,10 @@ impl Plate {
         })
     }
 
-    /// This plate with a mesh of `elements` elements along the longer side.
+    /// Sets the number of elements along the longer side.
     ///
     /// # Errors
-    /// [`PlateError`] as for [`Plate::new`].
+    /// As [`Plate::new`].
     pub fn with_elements(self, elements: usize) -> Result<Self, PlateError> {
         Self::new(PlateSpec { elements, ..self.spec })
     }
@@ -119,20 +114,20 @@ impl Plate {
         &self.spec
     }
 
-    /// Upper bound of the memory for solving the plate, in bytes, by an estimate.
+    /// Upper bound of the memory.
     pub fn estimated_bytes(&self) -> f64 {
         spec::estimated_bytes(&self.spec)
     }
 
-    /// Factors the plate's equations, unless this was done before.
+    /// Factors the equations, unless cached.
     ///
     /// # Errors
-    /// [`PlateError::Unsolvable`] when they are singular to working precision, or memory is insufficient.
+    /// [`PlateError::Unsolvable`] when singular to working precision, or too large.
     pub fn solve(&self) -> Result<(), PlateError> {
         self.solved(Watch::NONE).map(|_| ()).map_err(|reason| PlateError::Unsolvable { reason })
     }
 
-    /// Number of stored entries of the factor.
+    /// Stored entries of the factor.
     ///
     /// # Errors
     /// As [`Plate::solve`].
@@ -141,7 +136,7 @@ impl Plate {
         solved.map(Solved::stored_numbers).map_err(|reason| PlateError::Unsolvable { reason })
     }
 
-    /// The factored equations, or the reason of the failure. Cancelled work leaves no result: the next call starts anew.
+    /// Cancelled work is restarted by the next call.
     fn solved(&self, watch: Watch) -> Result<&Solved, Unsolvable> {
         let Computed { solved, solving, .. } = &*self.computed;
         if solved.get().is_none() {
@@ -162,12 +157,11 @@ impl Plate {
 }
 
 impl Surface for Plate {
-    /// NaN everywhere when [`Plate::solve`] fails.
+    /// NaN when [`Plate::solve`] fails.
     fn influence_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn InfluenceFunction + '_> {
         self.influence_functions(kind, &[sensor]).pop().unwrap_or_else(|| Arc::new(NotANumber))
     }
 
-    /// Solves for all sensors in few sweeps through the factor; reuses the functions of earlier calls.
     fn influence_functions(
         &self,
         kind: SensorKind,
@@ -211,7 +205,7 @@ impl Surface for Plate {
         Ok(proportional(self.influence_functions_watched(kind, sensors, watch)?))
     }
 
-    /// By reciprocity; `None` when [`Plate::solve`] fails.
+    /// `None` when [`Plate::solve`] fails.
     fn readings_by_contact(
         &self,
         sensors: &[(SensorKind, Position)],
@@ -220,12 +214,10 @@ impl Surface for Plate {
     }
 
     fn solution_cost(&self, sensors: usize, solving: Solving) -> Option<SolutionCost> {
-        /// Multiply-adds per second, for two dozen solutions in one sweep.
         const PRODUCTS: f64 = 7e9;
-        /// Bytes of the equations that are set up and factored per second.
         const FACTORED: f64 = 3e8;
         let sensors = sensors as f64;
-        // Two sweeps through the factor; by contact, readings and derivatives at 16 degrees of freedom for each sensor.
+        // Two sweeps through the factor; by contact also readings at 16 degrees of freedom per sensor.
         let sweeps = 2.0 * spec::estimated_factor_size(&self.spec);
         let (kept, multiply_adds) = match solving {
             Solving::BySensor => (PlateInfluence::bytes_of(&self.spec), sweeps),
@@ -255,8 +247,7 @@ impl Surface for Plate {
         spec::insensitive_sensor(&self.spec, kind, sensor)
     }
 
-    /// The largest influence over a coarse grid of sensors on a coarse mesh. In this theory the strain under a force
-    /// grows without bound as the contact nears the sensor. The scale is that of a force spread over an element of such a mesh.
+    /// On a coarse mesh, as the strain under a force at the sensor is singular.
     fn full_scale(&self, kind: SensorKind) -> f64 {
         self.computed.full_scales.get_or_init(|| full_scales(&self.spec))[kind as usize]
     }

@@ -1,22 +1,18 @@
-//! Rigid motions of a plate: up and down, and tilting about its two sides.
+//! Rigid motions of a plate.
 
 use super::mesh::{Mesh, NODE_DEGREES};
 use super::spec::{Edge, Edges};
 use palpate_numerics::small::add_multiple;
 
-/// Values of 1, x/ℓ and y/ℓ, with the longer side ℓ, or their coefficients.
+/// 1, x/ℓ and y/ℓ with the longer side ℓ, or coefficients.
 pub(super) type Motions = [f64; 3];
 
-/// The rigid motions that the edges allow: all three, tilting about the one simply supported edge, or none.
 pub(super) struct RigidMotions {
-    /// All degrees of freedom in each.
     motions: Vec<Vec<f64>>,
-    /// Nodes, by column and row, that must all be constrained to prevent these motions.
     nodes: Vec<(usize, usize)>,
 }
 
 impl RigidMotions {
-    /// The motions that `edges` allow.
     pub fn new(mesh: &Mesh, edges: Edges) -> Self {
         let [_, far_x, far_y] = motions_at(mesh, mesh.first_degree(mesh.across, mesh.up));
         let (middle_x, middle_y) = (mesh.across / 2, mesh.up / 2);
@@ -48,12 +44,12 @@ impl RigidMotions {
         self.motions.len()
     }
 
-    /// Nodes, by column and row, that prevent all the motions when they are constrained.
+    /// Nodes (column, row) that prevent the motions when constrained.
     pub fn nodes(&self) -> &[(usize, usize)] {
         &self.nodes
     }
 
-    /// R'·f: product of a load with each motion; 0 where its terms cancel to rounding.
+    /// R'·f; 0 where its terms cancel to rounding.
     pub fn resultants(&self, load: &(impl Iterator<Item = (usize, f64)> + Clone)) -> Vec<f64> {
         const ROUNDING: f64 = 1e-14;
         let value = |motion: &Vec<f64>| {
@@ -65,7 +61,7 @@ impl RigidMotions {
         self.motions.iter().map(value).collect()
     }
 
-    /// Adds the motions to `degrees`, each times its share and `factor`.
+    /// Adds motions times `factor` and shares.
     pub fn add(&self, degrees: &mut [f64], factor: f64, shares: &[f64]) {
         for (motion, share) in self.motions.iter().zip(shares) {
             add_multiple(degrees, factor * share, motion);
@@ -73,7 +69,6 @@ impl RigidMotions {
     }
 }
 
-/// 1, x/ℓ and y/ℓ at a degree of freedom.
 pub(super) fn motions_at(mesh: &Mesh, degree: usize) -> Motions {
     let (node, which) = (degree / NODE_DEGREES, degree % NODE_DEGREES);
     let (column, row) = (node % (mesh.across + 1), node / (mesh.across + 1));

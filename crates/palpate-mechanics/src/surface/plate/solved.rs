@@ -1,7 +1,4 @@
-//! The factored equations of a plate: each solution costs two sweeps through the factor.
-//!
-//! Symbols as in `supports.rs`: K₀ stiffness matrix without point supports, b the deflection of one as a functional, r the forces of the
-//! point supports on the plate, R rigid motions, f a load.
+//! Factored equations of a plate; symbols as in `supports.rs`.
 
 use ndarray::{Array1, Array2};
 
@@ -15,10 +12,7 @@ use palpate_numerics::small::add_multiple;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{SparseCholesky, SparseSymmetric};
 
-/// The factored equations of a plate.
-///
-/// A support need not be at a node. The factor is that of K₀ with the edges constrained and, where these allow rigid motions, with as
-/// many nodes constrained as prevent them. The forces of the point supports follow by the force method.
+/// Factored equations: K₀ₕ, and the supports by the force method, also off the nodes.
 pub(super) struct Solved {
     pub mesh: Mesh,
     unknowns: Unknowns,
@@ -28,31 +22,27 @@ pub(super) struct Solved {
     balance: Balance,
 }
 
-/// Largest number of loads in one sweep through the factor: more would cost memory and save little.
+/// More loads per sweep would cost memory and save little time.
 pub(super) const TOGETHER: usize = 24;
 
-/// Point supports and their effect on the plate.
 struct Supports {
-    /// The columns of B, one for each support.
+    /// Columns of B.
     deflections: Vec<Functional>,
-    /// K₀ₕ⁻¹·B, one column for each support.
+    /// Columns of K₀ₕ⁻¹·B.
     solutions: Vec<Vec<f64>>,
     forces: SupportForces,
     motions: RigidMotions,
 }
 
-/// Equilibrium of a solution: force and moments of the load, the point supports and the supported edges.
 struct Balance {
-    /// Force and both moments of an edge on the plate, per unit of each unknown that contributes to them.
     by_edges: Vec<(usize, Motions)>,
 }
 
 impl Solved {
-    /// Sets up and factors the equations of a checked plate, and solves them for forces all over it as a check.
+    /// Factors the equations and checks them by a grid of forces.
     ///
     /// # Errors
-    /// [`Unsolvable`] when the equations are singular to working precision or too large for the memory, when a solution is not in balance,
-    /// or when the watch stopped the work.
+    /// [`Unsolvable`] when singular, too large, unbalanced or cancelled.
     pub fn new(spec: &PlateSpec, watch: Watch) -> Result<Self, Unsolvable> {
         let mesh = Mesh::new(spec.extent(), spec.elements);
         let motions = RigidMotions::new(&mesh, spec.edges);
@@ -67,16 +57,11 @@ impl Solved {
         Ok(solved)
     }
 
-    /// Number of stored entries of the factor.
     pub fn stored_numbers(&self) -> usize {
         self.factor.stored_numbers()
     }
 
-    /// All degrees of freedom under each of `loads`: pairs of a functional and a factor for the solution. NaN where a solution is not in
-    /// balance.
-    ///
-    /// # Errors
-    /// [`Cancelled`] when the watch stopped it.
+    /// Solves for all degrees of freedom under loads, pairs of functional and factor; NaN if unbalanced.
     pub fn solutions(&self, loads: &[(Functional, f64)], watch: Watch) -> Result<Vec<Vec<f64>>, Cancelled> {
         let mut all = Vec::with_capacity(loads.len());
         for loads in loads.chunks(TOGETHER) {
@@ -94,8 +79,7 @@ impl Solved {
         Ok(all)
     }
 
-    /// The force of a point support on the plate, positive upward, under a downward unit force: r = P·y + Q·R'·f, as degrees of freedom of a
-    /// function of the force's position. `None` for a missing support.
+    /// r = P·y + Q·R'·f of a support, as degrees of freedom of an influence function.
     pub fn reaction(&self, support: usize) -> Option<Vec<f64>> {
         let Supports { solutions, forces, motions, .. } = &self.supports;
         (support < solutions.len()).then(|| {
@@ -109,8 +93,8 @@ impl Solved {
         })
     }
 
-    /// Shapes under loads, few enough for one sweep. Shapes out of balance are refined with their residuals as loads
-    /// (Golub and Van Loan, *Matrix Computations*, 3.5.3).
+    /// Solves with iterative refinement of unbalanced shapes (Golub and Van Loan, *Matrix Computations*,
+    /// 3.5.3).
     fn solve(&self, loads: &[&Functional], watch: Watch) -> Result<Vec<Shape>, Cancelled> {
         let each = |load: &&Functional| self.unknowns.gathered(load.iter().copied());
         let solved = self.swept(&loads.iter().map(each).collect::<Vec<_>>(), watch)?;
@@ -143,17 +127,16 @@ impl Solved {
         Ok(shapes)
     }
 
-    /// K₀ₕ⁻¹·f for each of `loads`.
     fn swept(&self, loads: &[Vec<f64>], watch: Watch) -> Result<Vec<Vec<f64>>, Cancelled> {
         let mut together = loads.concat();
         self.factor.solve_in_place_watched(&mut together, watch)?;
         Ok(together.chunks_exact(self.unknowns.count().max(1)).map(<[f64]>::to_vec).collect())
     }
 
-    /// The residual of a load: f + B·r − K₀·u, by degree of freedom; 0 where an edge constrains it.
+    /// Residual f + B·r − K₀·u; 0 where an edge constrains it.
     ///
-    /// In each element K₀ multiplies the difference from the rigid motion of the element's first node. Otherwise the rounding of a large
-    /// motion would bend the element.
+    /// K₀ multiplies the difference from the rigid motion of an element's first node, as the rounding of a
+    /// large motion would bend the element.
     fn residual(&self, shape: &Shape, load: &Functional) -> Vec<f64> {
         let (mesh, u) = (&self.mesh, self.unknowns.expand(&shape.bent, 1.0));
         let mut residual = vec![0.0; mesh.degrees()];
@@ -189,7 +172,6 @@ impl Solved {
         residual
     }
 
-    /// Adds the effect of the point supports to a shape that only `acting` bent, and computes its imbalance under `load`.
     fn hold(
         &self,
         shape: &mut Shape,
@@ -204,7 +186,6 @@ impl Solved {
         self.balance.off(&self.mesh, &self.unknowns, &self.supports, load, shape)
     }
 
-    /// Solves for forces on a grid that includes the edges.
     fn check(&self, spec: &PlateSpec, watch: Watch) -> Result<(), Unsolvable> {
         const ALONG: usize = 3;
         let at = |i: usize, size_m: f64| i as f64 / ALONG as f64 * size_m;
@@ -220,29 +201,23 @@ impl Solved {
     }
 }
 
-/// Imbalance above which a shape is refined, and the largest number of refinements.
+/// Largest imbalance without refinement.
 const REFINED_IMBALANCE: f64 = 0.3 * MOST_IMBALANCE;
 const MOST_REFINEMENTS: usize = 3;
 
-/// The shape of the plate under a load.
 struct Shape {
-    /// The unknowns of the constrained plate.
     bent: Vec<f64>,
-    /// Forces of the point supports on the plate.
     forces: Vec<f64>,
-    /// The rigid motions that are added to the unknowns.
     moved: Vec<f64>,
-    /// Imbalance of force or moment, as a share of the load.
     imbalance: f64,
 }
 
 impl Shape {
-    /// The shape with the rigid motions constrained, without point supports.
     fn held(bent: Vec<f64>) -> Self {
         Self { bent, forces: Vec::new(), moved: Vec::new(), imbalance: f64::NAN }
     }
 
-    /// True in balance; false for an imbalance of NaN.
+    /// False for NaN.
     fn is_balanced(&self) -> bool {
         self.imbalance <= MOST_IMBALANCE
     }
@@ -289,7 +264,6 @@ impl Supports {
         Ok(Self { deflections, solutions, forces, motions })
     }
 
-    /// Adds to a shape under `load` without point supports the effect of their forces: the forces, the bending and the rigid motion.
     fn hold(
         &self,
         unknowns: &Unknowns,
@@ -329,7 +303,7 @@ impl Balance {
         Self { by_edges: by_edges.collect() }
     }
 
-    /// Largest imbalance of force or a moment, as a share of the load; NaN where a value is NaN.
+    /// Imbalance of force or moments, relative to the load.
     fn off(
         &self,
         mesh: &Mesh,
@@ -358,29 +332,23 @@ impl Balance {
     }
 }
 
-/// The deflection of the plate at a position.
 fn deflection_at(mesh: &Mesh, position: Position) -> Functional {
     mesh.weights(mesh.locate(position), Derivative::None).to_vec()
 }
 
-/// Value of `functional` for the unknowns `u`.
 fn reading(unknowns: &Unknowns, functional: &Functional, u: &[f64]) -> f64 {
     let terms = functional.iter().filter_map(|(degree, value)| Some(value * u[unknowns.place(*degree)?]));
     terms.sum()
 }
 
-/// The unknowns: degrees of freedom that neither an edge nor a node constrains to zero, in the order of elimination.
+/// Unconstrained degrees of freedom in the order of elimination.
 struct Unknowns {
-    /// The equation of each degree of freedom.
     places: Vec<Option<u32>>,
-    /// Degree of freedom of each unknown.
     degrees: Vec<u32>,
-    /// The first degrees of freedom, the deflections, of the constrained nodes.
     nodes: Vec<usize>,
 }
 
 impl Unknowns {
-    /// The unknowns of a mesh with these conditions along its edges, and with the deflection of `nodes` constrained.
     pub fn new(mesh: &Mesh, edges: Edges, nodes: &[(usize, usize)]) -> Self {
         let (columns, rows) = mesh.nodes();
         let nodes: Vec<usize> = nodes.iter().map(|(column, row)| mesh.first_degree(*column, *row)).collect();
@@ -400,7 +368,6 @@ impl Unknowns {
         Self { places, degrees, nodes }
     }
 
-    /// The values at the unknowns, from values by degree of freedom.
     pub fn gathered(&self, values: impl Iterator<Item = (usize, f64)>) -> Vec<f64> {
         let mut gathered = vec![0.0; self.count()];
         for (degree, value) in values {
@@ -415,12 +382,11 @@ impl Unknowns {
         self.degrees.len()
     }
 
-    /// Number of the equation of a degree of freedom; `None` when it is constrained to zero.
+    /// Equation; `None` if constrained.
     pub fn place(&self, degree: usize) -> Option<usize> {
         self.places[degree].map(|place| place as usize)
     }
 
-    /// True for a degree of freedom that an edge constrains to zero.
     pub fn is_on_held_edge(&self, degree: usize) -> bool {
         self.places[degree].is_none() && !self.nodes.contains(&degree)
     }
@@ -429,16 +395,12 @@ impl Unknowns {
         self.degrees[unknown] as usize
     }
 
-    /// All degrees of freedom, from the unknowns times `factor`; 0 for a constrained one.
     pub fn expand(&self, unknowns: &[f64], factor: f64) -> Vec<f64> {
         self.places.iter().map(|place| place.map_or(0.0, |place| factor * unknowns[place as usize])).collect()
     }
 }
 
-/// Degrees of freedom of a node that its edges constrain to zero.
-///
-/// Along a supported edge w = 0, so the derivative of w along the edge is zero too. On a clamped edge the slope across it is
-/// zero as well, and so is the derivative of that slope along the edge.
+/// Constrained degrees of freedom: w and its derivative along a supported edge, all four on a clamped edge.
 fn held_degrees(mesh: &Mesh, edges: Edges, column: usize, row: usize) -> [bool; NODE_DEGREES] {
     let on = [
         (column == 0, edges.left, [true, false, true, false]),
@@ -460,17 +422,15 @@ fn held_degrees(mesh: &Mesh, edges: Edges, column: usize, row: usize) -> [bool; 
     held
 }
 
-/// A weighted sum of degrees of freedom, as pairs of index and weight: the deflection of a point, or the reading of a sensor.
+/// Weighted sum of degrees of freedom: index and weight.
 pub(super) type Functional = Vec<(usize, f64)>;
 
-/// The stiffness matrix of equal elements, for the unknowns only.
 fn stiffness_matrix(
     mesh: &Mesh,
     unknowns: &Unknowns,
     element: &ElementStiffness,
     watch: Watch,
 ) -> Result<SparseSymmetric, Cancelled> {
-    /// Columns between two checks of the watch.
     const EACH: usize = 1 << 12;
     let mut matrix = SparseSymmetric::with_capacity(unknowns.count() * NEIGHBOURS * NODE_DEGREES / 2);
     for unknown in 0..unknowns.count() {
@@ -484,19 +444,14 @@ fn stiffness_matrix(
     Ok(matrix)
 }
 
-/// A node couples with itself and the eight around it.
 const NEIGHBOURS: usize = 9;
 
-/// One column of the stiffness matrix: the couplings of a node's degree of freedom with the degrees of freedom of its neighbours.
 struct Column {
-    /// The node: column and row in the grid.
     node: (usize, usize),
-    /// Neighbours row by row, from the lower left one.
     couplings: [[f64; NODE_DEGREES]; NEIGHBOURS],
 }
 
 impl Column {
-    /// Degree of freedom and coupling of all neighbours that exist.
     fn entries(&self, mesh: &Mesh) -> impl Iterator<Item = (usize, f64)> {
         let (columns, rows) = mesh.nodes();
         self.couplings.iter().enumerate().flat_map(move |(i, couplings)| {
@@ -510,7 +465,6 @@ impl Column {
     }
 }
 
-/// Contributions of the up to four elements around a node to the column of its `degree`.
 fn element_column(mesh: &Mesh, element: &ElementStiffness, degree: usize) -> Column {
     let (node, own) = (degree / NODE_DEGREES, degree % NODE_DEGREES);
     let node = (node % (mesh.across + 1), node / (mesh.across + 1));
@@ -532,7 +486,6 @@ fn element_column(mesh: &Mesh, element: &ElementStiffness, degree: usize) -> Col
     column
 }
 
-/// Index of a node's degree of freedom within an element.
 fn local(end_x: usize, end_y: usize, degree: usize) -> usize {
     4 * (2 * end_y + degree / 2) + 2 * end_x + degree % 2
 }

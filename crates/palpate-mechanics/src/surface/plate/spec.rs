@@ -1,4 +1,4 @@
-//! The description of a plate, and the checks before any computation.
+//! Description of a plate, with checks.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,30 +10,29 @@ use crate::surface::{Extent, InsensitiveSensor};
 use crate::units::format_length_mm;
 use palpate_numerics::OutOfRange;
 
-/// A rectangular plate as plain data, which [`Plate::new`](super::Plate::new) checks: x runs along its length from the left
-/// edge to the right one, y along its width from the bottom edge to the top one.
+/// A rectangular plate, checked by [`Plate::new`](super::Plate::new).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlateSpec {
-    /// Length along x, in metres.
+    /// Length along x.
     pub length_m: f64,
-    /// Width along y, in metres.
+    /// Width along y.
     pub width_m: f64,
-    /// Thickness t, in metres; below about a tenth of the sides, because shear is neglected.
+    /// Thickness t; below a tenth of the sides, as shear is neglected.
     pub thickness_m: f64,
-    /// Young's modulus E, in pascals.
+    /// Young's modulus E.
     pub youngs_modulus_pa: f64,
-    /// Poisson's ratio ν, greater than −1 and at most 0.5.
+    /// Poisson's ratio ν, −1 < ν ≤ 0.5.
     pub poissons_ratio: f64,
-    /// Conditions along the edges.
+    /// Edge supports.
     pub edges: Edges,
-    /// Supports at points.
+    /// Point supports.
     pub supports: Vec<PointSupport>,
     /// Elements along the longer side.
     pub elements: usize,
 }
 
-/// Supports of the four edges; edges without a key are free.
+/// Supports of the four edges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Edges {
@@ -51,177 +50,174 @@ pub struct Edges {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Edge {
-    /// The deflection is zero, and the edge can turn.
+    /// No deflection.
     Simple,
-    /// The deflection and the slope are zero.
+    /// No deflection, no slope.
     Clamped,
     /// No support.
     #[default]
     Free,
 }
 
-/// A support at one point.
+/// A point support.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PointSupport {
-    /// Position.
+    /// The position.
     pub position: Position,
-    /// Kind.
+    /// The kind.
     pub kind: PointSupportKind,
 }
 
-/// Kind of a support at one point.
+/// Kind of a point support.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PointSupportKind {
-    /// The point does not move, and the plate can turn on it.
+    /// No deflection.
     Simple,
-    /// The deflection is proportional to the force.
+    /// A spring.
     Elastic {
-        /// Stiffness k, in newtons per metre; greater than 0.
+        /// Stiffness k > 0.
         stiffness_n_per_m: f64,
     },
 }
 
 impl PlateSpec {
-    /// Default number of elements along the longer side: the error of deflections is then about 10⁻⁴ of the
-    /// largest deflection (docs/explanation/plates.md).
+    /// Default, with errors of 10⁻⁴ of the largest deflection (docs/explanation/plates.md).
     pub const DEFAULT_ELEMENTS: usize = 128;
 
-    /// Flexural rigidity D = E·t³/(12·(1 − ν²)), in N·m.
+    /// D = E·t³/(12·(1 − ν²)), in N·m.
     pub fn flexural_rigidity(&self) -> f64 {
         self.youngs_modulus_pa * self.thickness_m.powi(3) / (12.0 * (1.0 - self.poissons_ratio.powi(2)))
     }
 
-    /// The area of the plate, for checked sides.
     pub(super) fn extent(&self) -> Extent {
         Extent::checked_plane(self.length_m, self.width_m)
     }
 }
 
 impl Edges {
-    /// Edges with one condition on all four sides.
+    /// Returns edges of one kind.
     pub const fn all(edge: Edge) -> Self {
         Self { left: edge, right: edge, bottom: edge, top: edge }
     }
 }
 
 impl PointSupport {
-    /// True for a support that does not move.
     pub(super) fn is_rigid(&self) -> bool {
         matches!(self.kind, PointSupportKind::Simple)
     }
 }
 
-/// A plate that cannot be computed.
+/// Error of an invalid plate.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PlateError {
-    /// A dimension is not a positive, finite number.
+    /// A dimension is not positive and finite.
     #[error(transparent)]
     NotPositive(#[from] OutOfRange),
-    /// A Poisson's ratio that is out of range.
+    /// Poisson's ratio is out of range.
     #[error("a plate's poissons_ratio is {value}; it must be greater than -1 and at most 0.5")]
     PoissonsRatio {
-        /// The ratio.
+        /// Poisson's ratio.
         value: f64,
     },
-    /// The compliance l²/D is not a positive, finite number.
+    /// l²/D is not positive and finite.
     #[error("a plate's compliance l²/D is {compliance_m_per_n} m/N; it must be greater than 0 and finite")]
     Compliance {
-        /// Longer side, squared, over flexural rigidity, in m/N.
+        /// l²/D, with the longer side l.
         compliance_m_per_n: f64,
     },
     /// Too few or too many elements.
     #[error("a plate has {elements} elements along its longer side; it must have {fewest} to {most}")]
     Elements {
-        /// Requested number.
+        /// Number of elements.
         elements: usize,
-        /// Smallest allowed number.
+        /// Smallest number.
         fewest: usize,
-        /// Largest allowed number.
+        /// Largest number.
         most: usize,
     },
-    /// The factor of the stiffness matrix would not fit into memory.
+    /// The factor is too large.
     #[error(
         "a plate of {elements} elements along its longer side needs {} of memory; at most {} can be used: take fewer elements",
         gibibytes(*bytes), gibibytes(*most)
     )]
     MeshTooLarge {
-        /// Elements along the longer side.
+        /// Number of elements.
         elements: usize,
-        /// Estimated bytes.
+        /// Estimated memory.
         bytes: f64,
-        /// The most bytes that can be used.
+        /// Largest memory.
         most: f64,
     },
-    /// A support outside the plate.
+    /// A support is off the plate.
     #[error(
         "support {number} is at {}, off the plate; it must be within (0, 0) and {}",
         Point(*at), Point(*corner)
     )]
     SupportOffPlate {
-        /// Number of the support, from 1.
+        /// Number of the support.
         number: usize,
-        /// Position.
+        /// The position.
         at: Position,
-        /// The corner opposite (0, 0).
+        /// Corner opposite (0, 0).
         corner: Position,
     },
-    /// An elastic support with an invalid stiffness.
+    /// A stiffness is invalid.
     #[error("support {number} has a stiffness of {value} N/m; it must be greater than 0 and finite")]
     Stiffness {
-        /// Number of the support, from 1.
+        /// Number of the support.
         number: usize,
-        /// Stiffness, in N/m.
+        /// Stiffness.
         value: f64,
     },
-    /// A support on an edge that is already supported.
+    /// A support is on a supported edge.
     #[error("support {number} is on the {edge} edge, which is already supported; remove it")]
     SupportOnHeldEdge {
-        /// Number of the support, from 1.
+        /// Number of the support.
         number: usize,
         /// Name of the edge.
         edge: &'static str,
     },
-    /// Two supports at one position.
+    /// Supports have one position.
     #[error("supports {first} and {second} are both at {}; leave one out", Point(*at))]
     SupportsAtOnePlace {
-        /// Number of the first support, from 1.
+        /// First number.
         first: usize,
-        /// Number of the second support, from 1.
+        /// Second number.
         second: usize,
         /// Their position.
         at: Position,
     },
-    /// Two simple supports that the mesh cannot distinguish.
+    /// Simple supports in one element.
     #[error(
         "simple supports {first} and {second} are {} apart, less than an element of {} × {}; take more elements, or one support",
         format_length_mm(*distance_m), format_length_mm(*side_x_m), format_length_mm(*side_y_m)
     )]
     SupportsTooClose {
-        /// Number of the first support, from 1.
+        /// First number.
         first: usize,
-        /// Number of the second support, from 1.
+        /// Second number.
         second: usize,
-        /// Their distance, in metres.
+        /// Distance.
         distance_m: f64,
-        /// An element's side along x, in metres.
+        /// Element side along x.
         side_x_m: f64,
-        /// An element's side along y, in metres.
+        /// Element side along y.
         side_y_m: f64,
     },
-    /// A plate without supports.
+    /// The plate has no support.
     #[error(
         "the plate has no supports: it can move up and down and tilt in every direction; support an edge, or three points"
     )]
     NotHeld,
-    /// A plate with a single point support.
+    /// A single point support.
     #[error("the plate is supported only at {}: it can tilt about that point in every direction; support it at three points at least", Point(*at))]
     HeldAtOnePoint {
         /// The point.
         at: Position,
     },
-    /// A plate with all its supports on one line.
+    /// All supports are on one line.
     #[error(
         "the plate can rotate about the line through {} and {}, on which all its supports are; support it beside that line",
         Point(*from), Point(*to)
@@ -232,50 +228,49 @@ pub enum PlateError {
         /// Another point of the line.
         to: Position,
     },
-    /// The equations could not be solved.
+    /// The equations have no solution.
     #[error("the equations of the plate could not be solved: {reason}")]
     Unsolvable {
-        /// Reason of the failure.
+        /// Reason.
         reason: Unsolvable,
     },
 }
 
-/// Largest imbalance of force, or of a moment over the longer side, as a share of the load.
+/// Largest imbalance, relative to the load.
 pub(super) const MOST_IMBALANCE: f64 = 1e-9;
 
-/// Error of a plate without a solution.
+/// Error of equations without a solution.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Unsolvable {
-    /// The stiffness matrix has no factor.
+    /// The stiffness matrix is singular.
     #[error(transparent)]
     Stiffness(#[from] palpate_numerics::SparseCholeskyError),
-    /// The compliances of the simple supports have no factor.
+    /// The equations of the supports are singular.
     #[error("the forces of the point supports could not be computed: {0}")]
     Supports(#[from] palpate_numerics::NotPositiveDefinite),
-    /// Supports and edges do not balance a force.
+    /// Forces are not in balance.
     #[error(
         "under a force at {} the supports are {share:e} of it out of balance; it must be at most {:e}",
         Point(*at), MOST_IMBALANCE
     )]
     OutOfBalance {
-        /// Unbalanced force, or unbalanced moment over the longer side, as a share of the force.
+        /// Imbalance relative to the force.
         share: f64,
         /// Position of the force.
         at: Position,
     },
-    /// The watch stopped the work.
+    /// The watch cancelled the work.
     #[error("{0}")]
     Cancelled(#[from] palpate_numerics::watch::Cancelled),
 }
 
 impl Unsolvable {
-    /// Advice on a remedy.
+    /// Suggested remedy.
     pub fn help(&self) -> &'static str {
         "take fewer `elements`, or lengths and stiffnesses that are less far apart"
     }
 }
 
-/// A position as text for messages.
 struct Point(Position);
 
 impl std::fmt::Display for Point {
@@ -288,23 +283,19 @@ fn gibibytes(bytes: f64) -> String {
     format!("{:.1} GiB", bytes / 2f64.powi(30))
 }
 
-/// Smallest and largest number of elements along the longer side.
 const FEWEST_ELEMENTS: usize = 4;
 const MOST_ELEMENTS: usize = 10_000;
 
-/// Largest memory for a plate's equations, in bytes: 4 GiB.
+/// 4 GiB.
 const MOST_BYTES: f64 = 4.0 * (1u64 << 30) as f64;
 
-/// Positions closer than this, as a share of the longer side, are the same.
+/// Tolerance of positions, relative to the longer side.
 const SAME_PLACE: f64 = 1e-9;
 
-/// Points closer to a line than this, as a share of the longer side, do not prevent rotation about it.
+/// Tolerance of a line, relative to the longer side.
 const ON_A_LINE: f64 = 1e-6;
 
-/// Checks all values of a plate, the cheap checks first.
-///
-/// # Errors
-/// [`PlateError`], with the value and its bound.
+/// Checks a plate, cheap checks first.
 pub(super) fn check(spec: &PlateSpec) -> Result<(), PlateError> {
     check_numbers(spec)?;
     for (i, support) in spec.supports.iter().enumerate() {
@@ -355,7 +346,7 @@ fn check_support(spec: &PlateSpec, number: usize, support: &PointSupport) -> Res
     }
 }
 
-/// Refuses two supports at one position, and two simple supports in one element: the mesh would have no freedom left there.
+/// Two simple supports would constrain an element completely.
 fn check_distances(spec: &PlateSpec) -> Result<(), PlateError> {
     let Mesh { side_x_m, side_y_m, .. } = Mesh::new(spec.extent(), spec.elements);
     for (i, one) in spec.supports.iter().enumerate() {
@@ -376,8 +367,7 @@ fn check_distances(spec: &PlateSpec) -> Result<(), PlateError> {
     Ok(())
 }
 
-/// Refuses a plate that can move without bending, because it has no equilibrium. The rigid motions w = a + b·x + c·y must all be prevented:
-/// by a clamped edge, or by points that are not on one line. A supported edge counts as its two ends.
+/// Rigid motions w = a + b·x + c·y: a supported edge counts as its ends.
 fn check_held(spec: &PlateSpec) -> Result<(), PlateError> {
     let edges = edges(spec);
     if edges.iter().any(|(.., edge)| *edge == Edge::Clamped) {
@@ -413,22 +403,20 @@ fn check_memory(spec: &PlateSpec) -> Result<(), PlateError> {
     }
 }
 
-/// Matrix elements that couple two nodes.
+/// Matrix elements per pair of nodes.
 const PAIR: f64 = (NODE_DEGREES * NODE_DEGREES) as f64;
 
-/// Estimated number of entries of the factor, without stored zeros.
 pub(super) fn estimated_factor_size(spec: &PlateSpec) -> f64 {
     let (columns, rows) = Mesh::new(spec.extent(), spec.elements).nodes();
     PAIR * coupled_pairs(columns, rows)
 }
 
-/// Upper bound of the memory of the plate's equations, in bytes: the factor, which couples pairs of nodes; the stiffness matrix, where
-/// a node couples with itself and its eight neighbours; and the solutions of the point supports.
+/// Factor, stiffness matrix, and solutions of the supports.
 pub(super) fn estimated_bytes(spec: &PlateSpec) -> f64 {
     const NUMBER_BYTES: f64 = 8.0;
-    /// Largest ratio of stored entries to nonzero ones: columns of nearly the same pattern are stored as one block, with zeros.
+    /// Largest ratio of stored to nonzero entries.
     const PADDING: f64 = 1.25;
-    /// A matrix element is a value and a row, and the library that factors the matrix copies it.
+    /// Value and row, copied by the factorisation.
     const ELEMENT_BYTES: f64 = 2.0 * (8.0 + 8.0);
     let mesh = Mesh::new(spec.extent(), spec.elements);
     let (columns, rows) = mesh.nodes();
@@ -439,10 +427,8 @@ pub(super) fn estimated_bytes(spec: &PlateSpec) -> f64 {
     factor + matrix + solutions
 }
 
-/// Reason for which a sensor of this `kind` at `position` reads 0 for every contact; `None` for a sensitive sensor.
-///
-/// On a supported edge w = 0, so the derivatives of w along the edge are zero too. On a clamped edge the slope across it is
-/// zero. On a simply supported edge the bending moment across it is zero, and with it the curvature.
+/// On a supported edge w and its derivatives along the edge are 0; on a clamped edge also the slope across
+/// it, on a simply supported edge the curvature across it.
 pub(super) fn insensitive_sensor(
     spec: &PlateSpec,
     kind: SensorKind,
@@ -465,7 +451,6 @@ pub(super) fn insensitive_sensor(
     (kind == SensorKind::Deflection).then_some(InsensitiveSensor::AtSupport { number: support + 1 })
 }
 
-/// Index of the support at `position`.
 pub(super) fn support_at(spec: &PlateSpec, position: Position) -> Option<usize> {
     let slack_m = SAME_PLACE * longer_side_m(spec);
     spec.supports.iter().position(|support| {
@@ -474,7 +459,6 @@ pub(super) fn support_at(spec: &PlateSpec, position: Position) -> Option<usize> 
     })
 }
 
-/// The edges at `position`, by name, and their conditions.
 fn edges_at(spec: &PlateSpec, position: Position) -> impl Iterator<Item = (&'static str, Edge)> {
     let near = |value: f64, bound: f64| (value - bound).abs() <= SAME_PLACE * longer_side_m(spec);
     let on = [
@@ -486,7 +470,6 @@ fn edges_at(spec: &PlateSpec, position: Position) -> impl Iterator<Item = (&'sta
     edges(spec).into_iter().zip(on).filter(|(_, on)| *on).map(|((name, _, edge), _)| (name, edge))
 }
 
-/// Name, ends and condition of each edge.
 fn edges(spec: &PlateSpec) -> [(&'static str, [Position; 2], Edge); 4] {
     let corner = |x_m, y_m| Position { x_m, y_m };
     let (length_m, width_m) = (spec.length_m, spec.width_m);
@@ -500,7 +483,7 @@ fn edges(spec: &PlateSpec) -> [(&'static str, [Position; 2], Edge); 4] {
     ]
 }
 
-/// The plate's own compliance ℓ²/D, with its longer side ℓ, in m/N.
+/// ℓ²/D with the longer side ℓ.
 pub(super) fn compliance_m_per_n(spec: &PlateSpec) -> f64 {
     longer_side_m(spec).powi(2) / spec.flexural_rigidity()
 }

@@ -1,47 +1,43 @@
-//! Forces of a plate's point supports, by the force method. As many degrees of freedom of the plate are constrained as prevent rigid motions.
-//! The forces of the supports then balance the load, and deflect the points of the supports according to their springs.
+//! Forces of a plate's point supports by the force method.
 //!
-//! Symbols: K₀ stiffness matrix of the plate without point supports; K₀ₕ that matrix with as many further degrees of freedom constrained as
-//! there are rigid motions; R rigid motions, a column each; b the deflection of a support as a functional, B all of them as columns;
-//! c a support's compliance, 0 for a simple one, C all of them as a diagonal; r forces of the supports on the plate; f a load.
+//! Symbols: K₀ stiffness matrix without point supports; K₀ₕ with further degrees of freedom constrained
+//! against rigid motions R; B deflections at the supports as functionals; C their compliances; r their forces
+//! on the plate; f a load.
 //!
-//! The shape is u = K₀ₕ⁻¹·(f + B·r) + R·a. It is in balance, R'·f + G'·r = 0 with G = B'·R, and at the supports B'·u = −C·r.
-//! With S = B'·K₀ₕ⁻¹·B and y = B'·K₀ₕ⁻¹·f these equations are
+//! With u = K₀ₕ⁻¹·(f + B·r) + R·a, R'·f + G'·r = 0, G = B'·R, B'·u = −C·r, S = B'·K₀ₕ⁻¹·B and y = B'·K₀ₕ⁻¹·f:
 //!
 //! ```text
 //! | S + C  G | |r|     | y    |
 //! | G'     0 |·|a| = − | R'·f |
 //! ```
 //!
-//! (Benzi, Golub and Liesen, *Numerical solution of saddle point problems*, 2005, section 6). Even for very soft springs no term
-//! is small beside a term that it is added to, whereas K₀ + B·C⁻¹·B' is then singular to working precision.
+//! (Benzi, Golub and Liesen, *Numerical solution of saddle point problems*, 2005, section 6). For soft
+//! springs K₀ + B·C⁻¹·B' would be singular.
 
 use ndarray::{Array1, Array2};
 
 use palpate_numerics::{Cholesky, NotPositiveDefinite};
 
-/// Blocks of the inverse of the supports' equations, from which forces and rigid motion follow: r = −P·y − Q·R'f and
-/// a = −Q'·y + N·R'f.
+/// Inverse: r = −P·y − Q·R'f, a = −Q'·y + N·R'f.
 pub(super) struct SupportForces {
-    /// P, in N/m.
+    /// P.
     pub by_deflection: Array2<f64>,
     /// Q.
     pub by_load: Array2<f64>,
-    /// N, in m/N.
+    /// N.
     pub motion_by_load: Array2<f64>,
 }
 
-/// Share of the plate's own compliance that is added to every scale, for rigid supports at constrained nodes.
+/// Lower bound of the scales, for rigid supports at constrained nodes.
 const LEAST_SCALE: f64 = 1e-3;
 
 impl SupportForces {
-    /// Blocks of the inverse from S + C, G, and the plate's own compliance ℓ²/D.
+    /// Inverts the equations from S + C, G, and ℓ²/D.
     ///
-    /// The supports are scaled to equal size, M = D·(S + C)·D, and the motions are made orthonormal over them, D·G = Ĝ·L'. The equations are
-    /// then those of M + Ĝ·Ĝ', which is positive definite wherever the supports prevent rigid motions.
+    /// With M = D·(S + C)·D and D·G = Ĝ·L', Ĝ orthonormal, M + Ĝ·Ĝ' is positive definite.
     ///
     /// # Errors
-    /// [`NotPositiveDefinite`] when the supports do not prevent rigid motions to working precision, or two supports coincide.
+    /// [`NotPositiveDefinite`] for rigid motions or coincident supports.
     pub fn new(
         compliance: &Array2<f64>,
         motions: &Array2<f64>,
@@ -57,7 +53,7 @@ impl SupportForces {
         let flexible = inverse.dot(&orthonormal);
         let shared = Cholesky::factor(orthonormal.t().dot(&flexible))?;
         let by_load = flexible.dot(&inverse_of(&shared));
-        // The forces balance exactly: the rounding error is added back, and removed from the forces without resultant.
+        // Exact balance: the rounding error is added back, and removed from the forces without resultant.
         let lacking = Array2::<f64>::eye(orthonormal.ncols()) - orthonormal.t().dot(&by_load);
         let by_load = &by_load + &orthonormal.dot(&lacking);
         let balanced = |forces: Array2<f64>| &forces - &orthonormal.dot(&orthonormal.t().dot(&forces));
@@ -70,7 +66,7 @@ impl SupportForces {
     }
 }
 
-/// Orthonormal columns by two passes of Gram–Schmidt, and the upper triangle that restores the originals.
+/// Gram–Schmidt in two passes, with the triangle that restores the originals.
 fn orthonormalised(mut columns: Array2<f64>) -> (Array2<f64>, Array2<f64>) {
     let count = columns.ncols();
     let mut triangle = Array2::zeros((count, count));

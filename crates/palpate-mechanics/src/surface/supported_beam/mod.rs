@@ -1,18 +1,13 @@
-//! A straight beam on any supports, with steps of its section, after Euler and Bernoulli: exact everywhere.
+//! The exact Euler–Bernoulli beam on any supports, with steps of its section.
 //!
-//! Between its ends, supports and section steps the shape of an unloaded beam is a cubic. So is an influence function: by the
-//! theorems of Betti and Maxwell, the reading of a sensor for a unit force at a is the deflection at a under a disturbance at the
-//! sensor. For a sensor at s the disturbances are
+//! The influence function of a sensor at s is the deflection under a disturbance at s (Betti, Maxwell):
 //!
 //! | sensor | disturbance |
 //! |---|---|
-//! | deflection y(s) | a unit force downward |
-//! | slope y'(s) | a unit couple |
-//! | strain (t/2)·y''(s) | a kink of −t/(2·E·I) |
-//! | reaction of a support at s | the ground under it rises by 1 |
-//!
-//! The admissible states to the left and to the right of the sensor are computed once for all sensors (see `structure`). Fitting the
-//! two together requires one system of six equations for each sensor. The result is the whole influence function, with its gradient.
+//! | deflection y(s) | unit force downward |
+//! | slope y'(s) | unit couple |
+//! | strain (t/2)·y''(s) | kink −t/(2·E·I) |
+//! | reaction at s | unit settlement upward |
 
 mod spec;
 mod structure;
@@ -31,13 +26,13 @@ use crate::sensing::SensorKind;
 use spec::SAME_PLACE;
 use structure::{Disturbance, Element, Hold, Shape, Site, State, Structure};
 
-/// Influences below this share of full scale are 0 except for rounding.
+/// Rounding error, relative to full scale.
 const ROUNDING: f64 = 1e-12;
 
-/// A beam on any supports, solved and ready for influence functions.
+/// A beam on any supports.
 ///
-/// Signs are those of the simply supported [`Beam`](super::Beam). The curvature jumps at a section step, and at a support with a reaction
-/// couple. A strain sensor there is on the right side of the jump; at the beam's right end it is on the left side.
+/// Signs are those of [`Beam`](super::Beam). At a jump of the curvature a strain sensor is on the right side,
+/// at the right end on the left.
 ///
 /// ```
 /// use palpate_mechanics::contact::Position;
@@ -61,14 +56,14 @@ const ROUNDING: f64 = 1e-12;
 pub struct SupportedBeam {
     spec: SupportedBeamSpec,
     structure: Structure,
-    /// The largest bending stiffness D, in N·m².
+    /// Largest bending stiffness D.
     stiffness_nm2: f64,
-    /// Full scale of every kind of sensor, in the order of [`SensorKind::ALL`].
+    /// By [`SensorKind::ALL`].
     full_scales: [f64; SensorKind::ALL.len()],
 }
 
 impl SupportedBeam {
-    /// Checks the description and computes everything that all sensors share.
+    /// Checks the description and solves it.
     ///
     /// # Errors
     /// [`SupportedBeamError`] for the first fault.
@@ -96,8 +91,6 @@ impl SupportedBeam {
         &self.spec
     }
 
-    /// Disturbance at the place of a sensor of this kind: the resulting shape is the sensor's influence function. `None` for a
-    /// raw channel and for a reaction without a support.
     fn disturbance(&self, kind: SensorKind, site: Site) -> Option<Disturbance> {
         let (l, stiffness) = (self.spec.length_m, self.stiffness_nm2);
         match kind {
@@ -164,8 +157,7 @@ impl Surface for SupportedBeam {
         held.then_some(InsensitiveSensor::Held { kind })
     }
 
-    /// Exact over contact positions, as the extremes of cubics. Over sensor positions by a scan of every element and golden
-    /// section search, to rounding. Computed once, in the constructor.
+    /// Exact over contact positions, to rounding over sensor positions.
     fn full_scale(&self, kind: SensorKind) -> f64 {
         self.full_scales[kind as usize]
     }
@@ -189,7 +181,6 @@ impl From<SupportedBeam> for SupportedBeamSpec {
     }
 }
 
-/// Nodes at the ends, supports and section steps, and the elements between them.
 fn structure(spec: &SupportedBeamSpec, stiffness_nm2: f64) -> Structure {
     let l = spec.length_m;
     let places = spec.sections.iter().map(|section| section.to_m);
@@ -218,8 +209,7 @@ fn structure(spec: &SupportedBeamSpec, stiffness_nm2: f64) -> Structure {
     Structure::new(l, nodes, holds, elements)
 }
 
-/// Compliances in the states' unit: a force of 1 N makes V jump by l³/D, a couple of 1 N·m makes M jump by l²/D, and
-/// the slope there is l times that of the beam.
+/// Compliances: 1 N makes V jump by l³/D, 1 N·m makes M jump by l²/D, slopes are multiplied by l.
 fn hold(kind: BeamSupportKind, l: f64, stiffness_nm2: f64) -> Hold {
     let rigid = |takes: bool| takes.then_some(0.0);
     match kind {
@@ -231,15 +221,11 @@ fn hold(kind: BeamSupportKind, l: f64, stiffness_nm2: f64) -> Hold {
     }
 }
 
-/// Sensor positions in the scan of an element.
 const PEAK_STEPS: u32 = 32;
-/// Steps of the golden section search around the best position.
 const HALVINGS: u32 = 60;
 
-/// The largest value of `at` from 0 to `length`: the best of evenly spaced places, refined by golden section search.
-///
-/// Exact to rounding where `at` has one maximum between neighbouring places. This is true for the smooth functions of the sensor's
-/// position on one element, which bend at most a few times there.
+/// Largest value, by a scan and golden-section search. Exact to rounding for one maximum between neighbouring
+/// positions, as on one element.
 fn largest_within(length: f64, at: impl Fn(f64) -> f64) -> f64 {
     let place = |step: u32| length * f64::from(step) / f64::from(PEAK_STEPS);
     let (best, value) = (0..=PEAK_STEPS)
@@ -250,7 +236,7 @@ fn largest_within(length: f64, at: impl Fn(f64) -> f64) -> f64 {
     value.max(golden_section(around, at))
 }
 
-/// The largest value in a golden section search (Kiefer, Proc. Am. Math. Soc. 4, 1953).
+/// Golden-section search (Kiefer, Proc. Am. Math. Soc. 4, 1953).
 fn golden_section((mut low, mut high): (f64, f64), at: impl Fn(f64) -> f64) -> f64 {
     let ratio = 0.5 * (5f64.sqrt() - 1.0);
     let (mut left, mut right) = (high - ratio * (high - low), low + ratio * (high - low));

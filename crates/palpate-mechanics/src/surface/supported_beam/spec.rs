@@ -1,33 +1,33 @@
-//! The description of a beam on any supports, its checks, and its texts.
+//! Description of a beam on any supports.
 
 use serde::{Deserialize, Serialize};
 
 use crate::units::{Dimension, Quantity, format_length_mm};
 use palpate_numerics::OutOfRange;
 
-/// A straight beam of rectangular sections with its supports, as plain data, which [`SupportedBeam::new`](super::SupportedBeam::new) checks.
+/// A rectangular beam on supports, checked by [`SupportedBeam::new`](super::SupportedBeam::new).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SupportedBeamSpec {
-    /// Length l, in metres.
+    /// Length l.
     pub length_m: f64,
-    /// Young's modulus E, in pascals.
+    /// Young's modulus E.
     pub youngs_modulus_pa: f64,
-    /// Parts of constant section, from left to right, which together cover the beam.
+    /// Parts from left to right.
     pub sections: Vec<BeamSection>,
-    /// Supports, in any order.
+    /// Supports.
     pub supports: Vec<BeamSupport>,
 }
 
-/// A part of the beam with one width and thickness. It begins at the end of the previous one, the first at 0.
+/// A part of constant section.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BeamSection {
-    /// End, in metres.
+    /// End.
     pub to_m: f64,
-    /// Width of the section, in metres.
+    /// Width.
     pub width_m: f64,
-    /// Thickness t of the section, in metres.
+    /// Thickness t.
     pub thickness_m: f64,
 }
 
@@ -35,35 +35,35 @@ pub struct BeamSection {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BeamSupport {
-    /// Position, in metres from the beam's left end.
+    /// Position.
     pub at_m: f64,
-    /// Kind.
+    /// The kind.
     pub kind: BeamSupportKind,
 }
 
-/// Kind of a support: the motions that it prevents.
+/// Kind of a support.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum BeamSupportKind {
-    /// No deflection, free to turn.
+    /// No deflection.
     Simple,
-    /// Neither deflection nor slope.
+    /// No deflection, no slope.
     Clamped,
-    /// No slope, free to deflect.
+    /// No slope.
     Guided,
-    /// An end of the beam without a support, listed explicitly.
+    /// A free end.
     Free,
-    /// A spring under the beam.
+    /// A spring.
     Elastic {
-        /// Upward force per metre of downward deflection, in N/m.
+        /// Stiffness.
         stiffness_n_per_m: f64,
-        /// Couple against the slope, in N·m/rad; `None` for a support that is free to turn.
+        /// Rotational stiffness.
         rotational_stiffness_nm_per_rad: Option<f64>,
     },
 }
 
 impl BeamSection {
-    /// Bending stiffness E·I in N·m², with I = width·t³/12.
+    /// E·I in N·m², I = width·t³/12.
     pub fn bending_stiffness(&self, youngs_modulus_pa: f64) -> f64 {
         youngs_modulus_pa * self.width_m * self.thickness_m.powi(3) / 12.0
     }
@@ -81,7 +81,7 @@ impl BeamSupportKind {
         }
     }
 
-    /// True for a support with a transverse reaction force.
+    /// True for a support with a reaction force.
     pub const fn takes_force(self) -> bool {
         matches!(self, Self::Simple | Self::Clamped | Self::Elastic { .. })
     }
@@ -95,14 +95,12 @@ impl BeamSupportKind {
     }
 }
 
-/// Largest number of sections, and of supports: more than a bench has.
 const MOST: usize = 100;
-/// Positions closer than this share of the length are the same.
+/// Tolerance of positions, relative to the length.
 pub(super) const SAME_PLACE: f64 = 1e-9;
 
 impl SupportedBeamSpec {
-    /// Checks that the beam can be computed: values in range, sections that cover it, and enough supports on it at different
-    /// positions.
+    /// Checks the description.
     ///
     /// # Errors
     /// [`SupportedBeamError`] for the first fault.
@@ -170,7 +168,6 @@ impl SupportedBeamSpec {
         Ok(())
     }
 
-    /// Checks that the supports prevent both translation and rotation.
     fn check_held(&self) -> Result<(), SupportedBeamError> {
         let mut forces = self.supports.iter().filter(|support| support.kind.takes_force());
         let couples = self.supports.iter().any(|support| support.kind.takes_couple());
@@ -185,7 +182,7 @@ impl SupportedBeamSpec {
 }
 
 impl SupportedBeamSpec {
-    /// Text of the supports from left to right: "clamped at 0 mm, elastic (2 N/mm) at 300 mm".
+    /// Formats the supports: "clamped at 0 mm, elastic (2 N/mm) at 300 mm".
     pub fn supports_in_words(&self) -> String {
         let mut supports = self.supports.clone();
         supports.sort_by(|a, b| a.at_m.total_cmp(&b.at_m));
@@ -195,7 +192,7 @@ impl SupportedBeamSpec {
         supports.iter().map(words).collect::<Vec<_>>().join(", ")
     }
 
-    /// Text of the sections as width × thickness: "40 mm × 1.2 mm", or "40 mm × 2 mm up to 100 mm, 40 mm × 1.2 mm up to 300 mm".
+    /// Formats the sections: "40 mm × 2 mm up to 100 mm, 40 mm × 1.2 mm up to 300 mm".
     pub fn sections_in_words(&self) -> String {
         let size = |section: &BeamSection| {
             format!("{} × {}", format_length_mm(section.width_m), format_length_mm(section.thickness_m))
@@ -226,30 +223,29 @@ fn kind_in_words(kind: BeamSupportKind) -> String {
     }
 }
 
-/// Error of a beam on supports that cannot be computed, with the part at fault. Sections and supports are numbered from 1, in the
-/// order of the description.
+/// Error of an invalid beam; parts are numbered from 1.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SupportedBeamError {
-    /// The length or the modulus is not a positive, finite number.
+    /// The length or the modulus is not positive and finite.
     #[error(transparent)]
     NotPositive(#[from] OutOfRange),
-    /// A dimension of a section is not a positive, finite number.
+    /// A dimension is not positive and finite.
     #[error("section {number}: {fault}")]
     Section {
         /// Number of the section.
         number: usize,
-        /// The dimension, in SI units.
+        /// Value and bound.
         fault: OutOfRange,
     },
-    /// A spring's stiffness is not a positive, finite number.
+    /// A stiffness is not positive and finite.
     #[error("support {number}: {fault}")]
     Stiffness {
         /// Number of the support.
         number: usize,
-        /// The stiffness, in SI units.
+        /// Value and bound.
         fault: OutOfRange,
     },
-    /// More sections than the largest number.
+    /// Too many sections.
     #[error("the beam has {found} sections; it can have at most {most}")]
     TooManySections {
         /// Number of sections.
@@ -257,7 +253,7 @@ pub enum SupportedBeamError {
         /// Largest number.
         most: usize,
     },
-    /// More supports than the largest number.
+    /// Too many supports.
     #[error("the beam has {found} supports; it can have at most {most}")]
     TooManySupports {
         /// Number of supports.
@@ -265,7 +261,7 @@ pub enum SupportedBeamError {
         /// Largest number.
         most: usize,
     },
-    /// Sections overlap, or are out of order.
+    /// Sections overlap or are out of order.
     #[error(
         "section {number} ends at {}, but the one before it reaches to {}: sections follow each other from left to right and do \
          not overlap",
@@ -275,12 +271,12 @@ pub enum SupportedBeamError {
     SectionsOverlap {
         /// Number of the section.
         number: usize,
-        /// End of the section before it, or 0, in metres.
+        /// End of the previous section.
         from_m: f64,
-        /// End, in metres.
+        /// End.
         to_m: f64,
     },
-    /// A section extends beyond the beam.
+    /// A section ends beyond the beam.
     #[error(
         "section {number} ends at {}, beyond the beam's end at {}",
         format_length_mm(*to_m),
@@ -289,24 +285,24 @@ pub enum SupportedBeamError {
     SectionBeyond {
         /// Number of the section.
         number: usize,
-        /// End, in metres.
+        /// End.
         to_m: f64,
-        /// The beam's length, in metres.
+        /// Length of the beam.
         length_m: f64,
     },
-    /// The sections end before the beam does.
+    /// The sections end before the beam.
     #[error(
         "the sections cover the beam up to {} only; it is {} long",
         format_length_mm(*to_m),
         format_length_mm(*length_m)
     )]
     SectionsEnd {
-        /// End of the last section, in metres.
+        /// End of the last section.
         to_m: f64,
-        /// The beam's length, in metres.
+        /// Length of the beam.
         length_m: f64,
     },
-    /// A support off the beam.
+    /// A support is off the beam.
     #[error(
         "support {number} is at {}, off the beam; it must be within 0 and {}",
         format_length_mm(*at_m),
@@ -315,22 +311,22 @@ pub enum SupportedBeamError {
     SupportOffBeam {
         /// Number of the support.
         number: usize,
-        /// Position, in metres.
+        /// Position.
         at_m: f64,
-        /// The beam's length, in metres.
+        /// Length of the beam.
         length_m: f64,
     },
-    /// Two supports at one position.
+    /// Supports have one position.
     #[error("supports {first} and {second} are both at {}", format_length_mm(*at_m))]
     SupportsTogether {
-        /// Number of the first support.
+        /// First number.
         first: usize,
-        /// Number of the second support.
+        /// Second number.
         second: usize,
-        /// Their position, in metres.
+        /// Their position.
         at_m: f64,
     },
-    /// A free end within the beam.
+    /// A free end is within the beam.
     #[error(
         "support {number} is `free` at {}, within the beam; free is an end, at 0 or {}",
         format_length_mm(*at_m),
@@ -339,62 +335,62 @@ pub enum SupportedBeamError {
     FreeWithin {
         /// Number of the support.
         number: usize,
-        /// Position, in metres.
+        /// Position.
         at_m: f64,
-        /// The beam's length, in metres.
+        /// Length of the beam.
         length_m: f64,
     },
-    /// The supports let the beam move as a whole.
+    /// The supports allow a rigid motion.
     #[error("the beam is a mechanism: {motion}")]
     Mechanism {
-        /// Motion that the supports allow.
+        /// Allowed motion.
         motion: RigidMotion,
     },
-    /// The largest deflection is not positive and finite, or is lost in rounding.
+    /// The compliance is not positive and finite, or lost in rounding.
     #[error(
         "a beam's largest deflection is {compliance_m_per_n} m/N; it must be greater than 0 and finite, and not be lost beside \
          the largest stiffness"
     )]
     Compliance {
-        /// The largest deflection per newton, in m/N.
+        /// Compliance.
         compliance_m_per_n: f64,
     },
 }
 
-/// A motion of the whole beam that causes no bending and no reaction of a support.
+/// A rigid motion.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RigidMotion {
     /// Translation and rotation.
     #[error("no support takes up force or couple, so it can move up and down and turn freely")]
     Any,
-    /// Translation up and down.
+    /// Translation.
     #[error("its supports fix the slope only, so it can move up and down freely")]
     UpAndDown,
     /// Rotation about the only support.
     #[error("only the support at {} takes up force, so it can turn about that freely", format_length_mm(*about_m))]
     Turning {
-        /// Position of that support, in metres.
+        /// Position of the support.
         about_m: f64,
     },
 }
 
-/// Part of a beam's description at fault.
+/// Faulty part of a description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BeamPart {
-    /// The whole description.
+    /// All of it.
     Whole,
-    /// The supports together.
+    /// All supports.
     Supports,
     /// One support, from 0.
     Support(usize),
-    /// The sections together.
+    /// All sections.
     Sections,
     /// One section, from 0.
     Section(usize),
 }
 
 impl SupportedBeamError {
-    /// The part at fault.
+    /// Faulty part.
     pub const fn part(&self) -> BeamPart {
         match *self {
             Self::NotPositive(_) | Self::Compliance { .. } => BeamPart::Whole,
@@ -410,7 +406,7 @@ impl SupportedBeamError {
         }
     }
 
-    /// Advice on a remedy.
+    /// Suggested remedy.
     pub const fn help(&self) -> Option<&'static str> {
         match self {
             Self::SectionsEnd { .. } => {

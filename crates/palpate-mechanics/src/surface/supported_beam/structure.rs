@@ -1,13 +1,9 @@
-//! The beam between its nodes: its admissible states, and its shape after a disturbance at one place.
+//! Admissible states of a beam, and its shape after a disturbance.
 //!
-//! Lengths here are shares of the beam's length l, and stiffnesses are shares of the beam's largest bending stiffness D. So all
-//! four numbers of a state have one magnitude and one unit, that of the deflection.
-//!
-//! For any load further along, the elements passed so far leave two degrees of freedom: the states of a section are the
-//! combinations of two. A sweep carries such a pair from the free space before the beam through its supports and elements.
-//! It makes the pair orthonormal after every support, to avoid loss of precision (Godunov's orthogonal sweep, Uspekhi
-//! Mat. Nauk 16(3), 1961). Stiffness matrices are not formed: their entries 12·E·I/h³ cost (l/h)³ digits for a short
-//! element, and they cannot represent a rigid support as the limit of a stiff spring.
+//! Lengths are shares of the length l, stiffnesses shares of the largest bending stiffness D. A sweep carries
+//! a basis of the two-dimensional space of states through supports and elements, and orthonormalises it
+//! (Godunov, Uspekhi Mat. Nauk 16(3), 1961). Stiffness matrices would lose (l/h)³ digits for an element of
+//! length h, and exclude rigid supports.
 
 use std::ops::{Add, Mul};
 
@@ -16,46 +12,39 @@ use crate::contact::Position;
 use crate::surface::InfluenceFunction;
 use palpate_numerics::small::solve_general;
 
-/// The beam between its nodes, with its admissible states from both ends.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Structure {
     length_m: f64,
-    /// Positions of the nodes, as shares of the length: ends, supports and section steps.
     pub nodes: Vec<f64>,
     pub holds: Vec<Hold>,
-    /// One fewer than nodes.
     pub elements: Vec<Element>,
     forth: Sweep,
     back: Sweep,
 }
 
-/// A place in an element. At the ends of the element it is on the element's side of the supports and steps.
+/// Position in an element; at an end, on the element's side of the node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Site {
     pub element: usize,
-    /// Distance from the element's beginning, as a share of the beam's length; from 0 to the element's length.
     pub offset: f64,
 }
 
-/// Disturbance of the beam at a site.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Disturbance {
-    /// The state jumps by this much.
     Jump(State),
-    /// The ground under the support at the site rises by 1.
+    /// Unit settlement upward of the support.
     Settlement,
 }
 
-/// Admissible states of the beam on both sides of a site.
 struct Surroundings {
-    /// Admissible states of the beam to the left, in the factors of `left_element`, if any.
+    /// Left states, in the factors of `left_element` of the forward sweep.
     left: Pair,
     left_element: Option<usize>,
-    /// Admissible states of the beam to the right, in the factors of `right_element` of the backward sweep, if any.
+    /// Right states, in the factors of `right_element` of the backward sweep.
     right: Pair,
     right_element: Option<usize>,
     hold: Hold,
-    /// True when the support is to the left of the disturbance.
+    /// True with the support left of the disturbance.
     held_left: bool,
 }
 
@@ -67,7 +56,7 @@ impl Structure {
         Self { length_m, nodes, holds, elements, forth, back }
     }
 
-    /// The site of a sensor: in the element to the right of a node, except for the last node.
+    /// Site of a position: right of a node, except for the last one.
     pub fn site(&self, place: f64) -> Site {
         let last = self.elements.len() - 1;
         let element =
@@ -83,7 +72,7 @@ impl Structure {
         Site { element, offset }
     }
 
-    /// Support of the beam at a site; `None` between nodes.
+    /// Support at a site; `None` between nodes.
     pub fn hold_at(&self, Site { element, offset }: Site) -> Option<Hold> {
         if offset <= 0.0 {
             Some(self.holds[element])
@@ -92,14 +81,12 @@ impl Structure {
         }
     }
 
-    /// Shape of the undisturbed beam: no deflection anywhere.
     pub fn unbent(&self) -> Shape {
         let nothing = State::DEFLECTION * 0.0;
         let piece = Piece { from: 0.0, to: 1.0, start: nothing, end: nothing, stiffness: 1.0 };
         Shape { length_m: self.length_m, pieces: vec![piece] }
     }
 
-    /// The beam's shape after a disturbance: the admissible states to the left and to the right of the site, fitted together.
     pub fn shape(&self, site: Site, disturbance: Disturbance) -> Shape {
         let around = self.surroundings(site);
         let (left, right) = around.fitted(disturbance);
@@ -111,7 +98,7 @@ impl Structure {
     fn surroundings(&self, Site { element, offset }: Site) -> Surroundings {
         let last = self.elements.len() - 1;
         let Element { length, stiffness, .. } = self.elements[element];
-        // Elements to the right of this one, which the backward sweep passes first.
+        // Elements to the right of this one, first in the backward sweep.
         let beyond = last - element;
         let forward = |offset: f64| self.forth.start(element).map(|state| state.advanced(offset, stiffness));
         let backward = |offset: f64| self.back.start(beyond).map(|state| state.advanced(offset, stiffness));
@@ -142,7 +129,6 @@ impl Structure {
         pieces
     }
 
-    /// Whole elements, with the states at their left and right ends.
     fn pieces(
         &self,
         elements: impl Iterator<Item = usize>,
@@ -170,8 +156,7 @@ impl Structure {
 }
 
 impl Surroundings {
-    /// The factors of both sides, from six equations. From left to right the state jumps by the disturbance, by the support's force and by its
-    /// couple. The support's deflection is proportional to the force, and its rotation to the couple.
+    /// Solves for the factors: jumps by disturbance, force and couple, and two laws of the support.
     fn fitted(&self, disturbance: Disturbance) -> (Factors, Factors) {
         let (jump, settlement) = match disturbance {
             Disturbance::Jump(jump) => (jump, 0.0),
@@ -209,17 +194,13 @@ impl Surroundings {
     }
 }
 
-/// Influence function of a sensor: the shape of the beam under a disturbance at the sensor (Betti and Maxwell;
-/// Müller-Breslau, *Die neueren Methoden der Festigkeitslehre*, 1886).
+/// Influence function (Betti and Maxwell; Müller-Breslau, *Die neueren Methoden der Festigkeitslehre*, 1886).
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Shape {
-    /// Length of the beam, in metres.
     pub length_m: f64,
-    /// Cubics from one end of the beam to the other.
     pub pieces: Vec<Piece>,
 }
 
-/// One cubic, given by its states at both ends. Places are shares of the beam's length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Piece {
     pub from: f64,
@@ -230,7 +211,7 @@ pub(super) struct Piece {
 }
 
 impl Piece {
-    /// The state at a place, computed from the nearer end: the deflection then vanishes correctly next to a support.
+    /// State from the nearer end, so that the deflection vanishes next to a support.
     fn state_at(&self, place: f64) -> State {
         let (behind, ahead) = (place - self.from, self.to - place);
         if behind <= ahead {
@@ -240,7 +221,7 @@ impl Piece {
         }
     }
 
-    /// The largest magnitude of the deflection: at an end, or where the slope, a quadratic, is 0.
+    /// Largest deflection, at an end or at a root of the slope.
     fn peak(&self) -> f64 {
         let State { slope, moment, shear, .. } = self.start;
         let level = roots(shear / 2.0, moment, slope * self.stiffness);
@@ -252,7 +233,6 @@ impl Piece {
 }
 
 impl Shape {
-    /// The largest magnitude over all contact positions.
     pub fn peak(&self) -> f64 {
         self.pieces.iter().map(Piece::peak).fold(0.0, f64::max)
     }
@@ -274,57 +254,46 @@ impl InfluenceFunction for Shape {
     }
 }
 
-/// The real roots of a·t² + b·t + c; NaN for a missing one.
+/// Real roots, or NaN.
 fn roots(a: f64, b: f64, c: f64) -> [f64; 2] {
     let root = (b * b - 4.0 * a * c).sqrt();
     let q = -0.5 * (b + if b < 0.0 { -root } else { root });
     [q / a, c / q]
 }
 
-/// Two states that span all admissible ones; the factors of a combination.
+/// Basis of the admissible states.
 type Pair = [State; 2];
 type Factors = [f64; 2];
 
-/// Compliances of a node's support: deflection per unit force and rotation per unit couple, in the states' unit. 0 is
-/// rigid, `None` free.
+/// Compliances for force and couple; 0 is rigid, `None` free.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Hold {
     pub yielding: Option<f64>,
     pub turning: Option<f64>,
 }
 
-/// The part of the beam between neighbouring nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Element {
-    /// Length as a share of the beam's length.
     pub length: f64,
-    /// Bending stiffness as a share of the beam's largest.
     pub stiffness: f64,
     pub thickness_m: f64,
 }
 
-/// The admissible states of every element, in the direction of the sweep.
 #[derive(Clone, Debug, PartialEq)]
 struct Sweep {
     passages: Vec<Passage>,
 }
 
-/// The admissible states of one element.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Passage {
-    /// Pair just behind the support at the element's beginning.
     start: Pair,
-    /// Pair just before the support at the element's end, with the same factors.
     end: Pair,
-    /// Matrix from this element's factors to those of the element before.
     before: [Factors; 2],
 }
 
-/// States of an unsupported section before the beam.
 const FREE: Pair = [State::DEFLECTION, State::SLOPE];
 
 impl Sweep {
-    /// Sweeps through `elements`, each with the support of the node at its beginning.
     pub fn new(elements: impl Iterator<Item = (Hold, Element)>) -> Self {
         let mut passages = Vec::new();
         let mut pair = FREE;
@@ -337,19 +306,16 @@ impl Sweep {
         Self { passages }
     }
 
-    /// The pair just behind the support at the beginning of an element.
     pub fn start(&self, element: usize) -> Pair {
         self.passages[element].start
     }
 
-    /// The pair just before the support at the end of the first `passed` elements; the pair of the free space
-    /// for none.
+    /// Pair after `passed` elements.
     pub fn end(&self, passed: usize) -> Pair {
         passed.checked_sub(1).map_or(FREE, |last| self.passages[last].end)
     }
 
-    /// The states at the beginning and the end of `element` and of all elements before it, nearest first, for the combination with these
-    /// factors in `element`.
+    /// States at both ends of `element` and of those before it, nearest first.
     pub fn back_from(&self, element: usize, factors: Factors) -> impl Iterator<Item = (State, State)> + '_ {
         self.passages[..=element].iter().rev().scan(factors, |factors, passage| {
             let states = (combined(passage.start, *factors), combined(passage.end, *factors));
@@ -359,12 +325,11 @@ impl Sweep {
     }
 }
 
-/// The combination of a pair.
 fn combined([first, second]: Pair, [a, b]: Factors) -> State {
     first * a + second * b
 }
 
-/// A pair, and the matrix from its factors to those of the original pair, by columns.
+/// A pair, with the matrix from its factors to the original pair's, by columns.
 type Mixture = (Pair, [Factors; 2]);
 
 const UNMIXED: [Factors; 2] = [[1.0, 0.0], [0.0, 1.0]];
@@ -373,8 +338,8 @@ fn mixed([first, second]: [Factors; 2], [a, b]: Factors) -> Factors {
     [first[0] * a + second[0] * b, first[1] * a + second[1] * b]
 }
 
-/// The pair behind a support with the compliance c. One combination has no deflection and passes unchanged.
-/// The other one gets a force of −w/c; it is multiplied by c, so that a rigid support needs no special case.
+/// Pair behind a support of compliance c: the state without deflection is unchanged, the other gets a force
+/// of −w/c, times c as c may be 0.
 fn yielded(mixture: Mixture, yielding: Option<f64>) -> Mixture {
     let Some(c) = yielding else { return mixture };
     let ((still, still_mix), (moving, moving_mix)) = parted(mixture, |state| state.deflection);
@@ -382,7 +347,7 @@ fn yielded(mixture: Mixture, yielding: Option<f64>) -> Mixture {
     ([State { deflection: 0.0, ..still }, met], [still_mix, moving_mix.map(|factor| factor * c)])
 }
 
-/// The pair behind a support with the rotational compliance c, likewise.
+/// As [`yielded`], for rotation.
 fn turned(mixture: Mixture, turning: Option<f64>) -> Mixture {
     let Some(c) = turning else { return mixture };
     let ((still, still_mix), (moving, moving_mix)) = parted(mixture, |state| state.slope);
@@ -390,7 +355,6 @@ fn turned(mixture: Mixture, turning: Option<f64>) -> Mixture {
     ([State { slope: 0.0, ..still }, met], [still_mix, moving_mix.map(|factor| factor * c)])
 }
 
-/// The combination with `part` equal to 0, and the one at right angles to it.
 fn parted((pair, mix): Mixture, part: fn(State) -> f64) -> ((State, Factors), (State, Factors)) {
     let [a, b] = pair.map(part);
     let size = a.hypot(b);
@@ -399,7 +363,7 @@ fn parted((pair, mix): Mixture, part: fn(State) -> f64) -> ((State, Factors), (S
     (combination([-b, a]), combination([a, b]))
 }
 
-/// Gram–Schmidt, done twice, which is enough (Kahan, in Parlett, *The Symmetric Eigenvalue Problem*, 6.9).
+/// Gram–Schmidt, twice (Kahan, in Parlett, *The Symmetric Eigenvalue Problem*, 6.9).
 fn orthonormal(mixture: Mixture) -> Mixture {
     let (mut pair, mut mix) = mixture;
     scale(&mut pair, &mut mix, 0);
@@ -421,14 +385,13 @@ fn scale(pair: &mut Pair, mix: &mut [Factors; 2], which: usize) {
     mix[which] = mix[which].map(|value| value * factor);
 }
 
-/// The state of one section: deflection w, slope θ = dw/dξ, moment M = r·d²w/dξ² and its derivative V = dM/dξ, with
-/// ξ = x/l and r the element's stiffness over D. All four are continuous where no disturbance acts.
+/// State: deflection w, slope dw/dξ, moment M = r·d²w/dξ² and V = dM/dξ, with ξ = x/l and stiffness r·D.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct State {
     pub deflection: f64,
     pub slope: f64,
     pub moment: f64,
-    /// Jumps up at upward loads: D·ΔV = q·l³ for a force q in newtons.
+    /// D·ΔV = q·l³ for an upward force q.
     pub shear: f64,
 }
 
@@ -438,7 +401,7 @@ impl State {
     pub const MOMENT: Self = Self { deflection: 0.0, slope: 0.0, moment: 1.0, shear: 0.0 };
     pub const SHEAR: Self = Self { deflection: 0.0, slope: 0.0, moment: 0.0, shear: 1.0 };
 
-    /// The state `by` further along an unloaded element of this stiffness: w is a cubic.
+    /// State `by` further along an unloaded element.
     pub fn advanced(self, by: f64, stiffness: f64) -> Self {
         let Self { deflection, slope, moment, shear } = self;
         Self {
@@ -449,7 +412,6 @@ impl State {
         }
     }
 
-    /// The state in the opposite direction of x.
     pub fn mirrored(self) -> Self {
         Self { slope: -self.slope, shear: -self.shear, ..self }
     }

@@ -11,7 +11,6 @@ mod refusals;
 
 static PAPER: LazyLock<Beam> = LazyLock::new(|| Beam::new(0.4, 0.04, 0.0012, 200e9).unwrap());
 
-/// An elastic support.
 fn spring(stiffness_n_per_m: f64, rotational_stiffness_nm_per_rad: Option<f64>) -> BeamSupportKind {
     BeamSupportKind::Elastic { stiffness_n_per_m, rotational_stiffness_nm_per_rad }
 }
@@ -34,7 +33,8 @@ fn at(surface: &dyn Surface, kind: SensorKind, sensor_m: f64, contact_m: f64) ->
     surface.influence(kind, Position::along(sensor_m), Position::along(contact_m))
 }
 
-/// The largest difference of two surfaces' influence functions, as a share of full scale; reactions at `supports_m`.
+/// Largest difference of two surfaces' influence functions, as a share of full scale; reactions at
+/// `supports_m`.
 fn largest_difference(a: &dyn Surface, b: &dyn Surface, supports_m: &[f64]) -> f64 {
     let l = a.length_m();
     let even: Vec<f64> = (0..=30).map(|i| l * f64::from(i) / 30.0).collect();

@@ -1,13 +1,12 @@
-//! Claims on artificial outcomes, which confirm every claim or reject it.
+//! Claims on artificial outcomes.
 
 use super::*;
 use crate::{ArmOutcome, PreparedStudy, Study, TrainedSeed};
 use palpate_numerics::watch::Watch;
 
-/// Results of a made-up arm: the error of every estimate in % of the length, and the epochs.
+/// Error in % of the length, and epochs.
 type MadeUp = fn(&str, u32) -> (f64, u32);
 
-/// The paper's arms with three seeds each and the errors `made_up`.
 fn judged(made_up: MadeUp) -> Vec<Claim> {
     let text = crate::paper::STUDY_TOML.replace("max_epochs = 1_000_000", "max_epochs = 1");
     let prepared = PreparedStudy::new(Study::from_toml(&text).unwrap(), Watch::NONE).unwrap();

@@ -1,13 +1,13 @@
 use super::*;
 use crate::sensors::limit_objective::padded;
 
-/// Blocks without any pattern; the same for the same seed.
+/// Blocks without a pattern, reproducible by the seed.
 fn blocks(count: usize, seed: usize) -> Vec<Block> {
     let value = |i: usize| ((i * 7 + seed * 3) as f64 * 0.7).sin() * [2.0, 40.0, 1e-3][(i + seed) % 3];
     padded(&(0..count * LANES).map(value).collect::<Vec<_>>())
 }
 
-/// Bits of the sums by the machine's widest registers and by plain Rust.
+/// Bits of the sums by vector instructions and by plain Rust.
 fn both<const P: usize, const FIRST: usize, S: Sums>(sums: &S, seed: usize) -> [[u64; 2]; 2] {
     let n = 5;
     let (mut covariances, row) = (blocks(packed(P, 0) * n, seed), blocks(P * n, seed + 1));

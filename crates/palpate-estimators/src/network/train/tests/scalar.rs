@@ -1,8 +1,8 @@
-//! Back-propagation with momentum, one network, as in textbooks: the reference for the SIMD lanes.
+//! Textbook back-propagation, the reference for SIMD lanes (Rumelhart, Hinton and Williams, Nature 323,
+//! 1986).
 //!
-//! Rumelhart, Hinton and Williams, Nature 323 (1986), with one update a pattern. Symbols: w weights, Δw the last step,
-//! x inputs of a layer, z weighted sums, a outputs, t targets, δ = −∂E/∂z for E = ½ Σ (t − a)², η learning rate,
-//! α momentum:
+//! Symbols: w weights, Δw last step, x inputs of a layer, z weighted sums, a outputs, t targets, δ = −∂E/∂z
+//! for E = ½ Σ (t − a)², η learning rate, α momentum:
 //!
 //! ```text
 //! δ = (t − a) f′(z)             at the output
@@ -10,7 +10,7 @@
 //! Δw = η δ x + α Δw_last
 //! ```
 //!
-//! `V` is one lane of the SIMD lanes' arithmetic, so that both round alike.
+//! `V` is one SIMD lane, for equal rounding.
 
 use crate::network::logistic::{activate, derivative};
 use crate::network::train::Layer;
@@ -18,7 +18,6 @@ use crate::network::train::order::{OrderDrawer, Streams};
 use crate::network::{PresentationOrder, TrainedNetwork, TrainingOutcome, TrainingTask};
 use palpate_numerics::simd::{Real, Vector};
 
-/// Trains the network of one seed.
 #[inline(always)]
 pub(super) fn train<V: Vector<1>>(task: &TrainingTask, seed: u64) -> TrainedNetwork {
     let patterns = task.patterns;
@@ -55,7 +54,6 @@ fn value<V: Vector<1>>(x: f64) -> V {
     V::splat(V::Real::from_f64(x))
 }
 
-/// Every pattern's inputs, each row followed by the 1 for the biases.
 fn inputs_with_bias<V: Vector<1>>(task: &TrainingTask) -> Vec<V> {
     let bias = task.topology.biases.then_some(1.0);
     let rows = task.patterns.input_values.chunks_exact(task.patterns.inputs);
@@ -101,7 +99,6 @@ impl<V: Vector<1>> Network<V> {
         }
     }
 
-    /// δ of the output layer; the squared errors are added to `error`.
     #[inline(always)]
     fn compare(&mut self, targets: &[V], mut error: V) -> V {
         if let Some(layer) = self.layers.last_mut() {
@@ -114,7 +111,6 @@ impl<V: Vector<1>> Network<V> {
         error
     }
 
-    /// δ of the layers below the output.
     #[inline(always)]
     fn send_back(&mut self) {
         for k in (1..self.layers.len()).rev() {

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Force and moments over the longer side that the supports leave unbalanced under a unit force at `contact`.
+/// Unbalanced force, and moments over the longer side, under a unit force at `contact`.
 fn imbalance(plate: &Plate, contact: Position) -> f64 {
     let supports = plate.spec().supports.iter().map(|support| support.position);
     let mut sums = [-1.0, -contact.x_m, -contact.y_m];
@@ -17,7 +17,7 @@ fn imbalance(plate: &Plate, contact: Position) -> f64 {
         .fold(0.0, |a, b| if b <= a { a } else { b })
 }
 
-/// A plate on springs only: at four corners, the middle of an edge and a point off the nodes.
+/// A plate on springs at four corners, the middle of an edge and a point off the nodes.
 fn on_springs(stiffness_n_per_m: f64, elements: usize) -> Plate {
     let mut spec = steel(0.3, 0.2, Edges::default(), elements);
     let places = [(0.0, 0.0), (0.3, 0.0), (0.0, 0.2), (0.3, 0.2), (0.15, 0.0), (0.1234, 0.117)];
@@ -43,8 +43,9 @@ fn springs_of_every_stiffness_balance_force_and_moments() {
 
 #[test]
 fn a_plate_on_soft_springs_moves_as_a_rigid_one_and_bends_as_if_the_springs_were_forces() {
-    // Closed form of a rigid plate on springs k at its four corners: the springs share a force at (x, y) as products of linear functions, which
-    // lowers the plate by (1 + (2x/l − 1)·(2x'/l − 1) + (2y/b − 1)·(2y'/b − 1))/(4k) at (x', y').
+    // Rigid plate on springs k at its four corners: they share a force at (x, y) as products of linear
+    // functions, and the deflection at (x', y') is
+    // (1 + (2x/l − 1)·(2x'/l − 1) + (2y/b − 1)·(2y'/b − 1))/(4k).
     let corners = [(0.0, 0.0), (0.3, 0.0), (0.0, 0.2), (0.3, 0.2)];
     for stiffness_n_per_m in [1e-3, 0.2] {
         let mut spec = steel(0.3, 0.2, Edges::default(), 96);
@@ -55,7 +56,7 @@ fn a_plate_on_soft_springs_moves_as_a_rigid_one_and_bends_as_if_the_springs_were
             let ([a, b], [c, d]) = (share(sensor), share(contact));
             let rigid = -(1.0 + a * c + b * d) / (4.0 * stiffness_n_per_m);
             let found = deflection(&plate, sensor, contact);
-            // The plate's bending is of the order of l²/D = 0.01 m/N, the deflection of a spring is 1/k.
+            // Bending is of the order of l²/D = 0.01 m/N, the deflection of a spring 1/k.
             assert!((found - rigid).abs() < 0.01, "{found} {rigid}");
             for (x, y) in corners {
                 let [e, f] = share(at(x, y));
@@ -64,7 +65,7 @@ fn a_plate_on_soft_springs_moves_as_a_rigid_one_and_bends_as_if_the_springs_were
                 assert!((reaction - shared).abs() < 0.02 * stiffness_n_per_m, "{reaction} {shared}");
             }
         }
-        // A strain gauge is insensitive to rigid motions: for softer springs its reading is closer to that under the forces of a rigid plate.
+        // Strain is independent of rigid motions: for softer springs it is closer to that of a rigid plate.
         let strain = |plate: &Plate| plate.influence(SensorKind::Strain, at(0.16, 0.11), at(0.12, 0.09));
         let stiffer = on_corners(1.0);
         assert!(off(strain(&plate), strain(&stiffer)) < 0.05, "{} {}", strain(&plate), strain(&stiffer));

@@ -11,7 +11,7 @@ fn strip(left: Edge, right: Edge) -> Plate {
     plate(PlateSpec { poissons_ratio: 0.0, ..steel(LENGTH_M, WIDTH_M, edges, 40) })
 }
 
-/// The mean of an influence function across the strip: the reading under a line load.
+/// Mean of an influence function across the strip, for a line load.
 fn across(plate: &Plate, kind: SensorKind, sensor: Position, x_m: f64) -> f64 {
     let influence = plate.influence_function(kind, sensor);
     let mesh = mesh_of(plate);
@@ -19,7 +19,7 @@ fn across(plate: &Plate, kind: SensorKind, sensor: Position, x_m: f64) -> f64 {
     places.iter().map(|(y_m, weight)| weight * influence.at(at(x_m, *y_m))).sum::<f64>() / WIDTH_M
 }
 
-/// At element boundaries, where the elements represent a beam's cubics exactly.
+/// Element boundaries, where the elements represent a beam's cubics exactly.
 const SENSORS_M: [f64; 3] = [0.05, 0.2, 0.33];
 const CONTACTS_M: [f64; 4] = [0.04, 0.11, 0.2, 0.37];
 

@@ -7,7 +7,7 @@ use super::super::mesh::{Mesh, element_stiffness};
 use super::*;
 use crate::surface::Extent;
 
-/// The degrees of freedom of w = (a·x² + 2·b·x·y + c·y²)/2 in one element.
+/// Degrees of freedom of w = (a·x² + 2·b·x·y + c·y²)/2 in one element.
 fn bent(mesh: &Mesh, [a, b, c]: [f64; 3]) -> [f64; 16] {
     let (h_x, h_y) = (mesh.side_x_m, mesh.side_y_m);
     std::array::from_fn(|i| {
@@ -81,8 +81,8 @@ fn a_mesh_has_no_element_longer_than_wide_unless_four_are_too_many() {
     assert_eq!(mesh(0.4, 0.01, 40), (40, 4));
 }
 
-/// The largest difference of deflections between two meshes of one plate, as a share of full scale. The contact positions include
-/// the positions of the sensors.
+/// Largest difference of deflections between two meshes, as a share of full scale, also for contacts at the
+/// sensors.
 fn difference(one: &Plate, other: &Plate) -> f64 {
     let place = |x: f64, y: f64| at(one.spec().length_m * x, one.spec().width_m * y);
     let sensors = [(0.25, 0.25), (0.5, 0.5), (0.611, 0.3), (0.9, 0.07), (0.99, 0.4)];
@@ -99,8 +99,8 @@ fn difference(one: &Plate, other: &Plate) -> f64 {
     worst / one.full_scale(SensorKind::Deflection)
 }
 
-/// The convergence at a force's singularity is of second order. So the error of the finer of two meshes, with half the side, is a third of
-/// their difference.
+/// Convergence at a force's singularity is of second order, so the error of the finer of two meshes is a
+/// third of their difference.
 #[test]
 fn the_default_mesh_holds_deflections_to_a_ten_thousandth_of_full_scale() {
     let mut on_points = steel(0.3, 0.2, Edges::all(Edge::Free), 64);

@@ -10,7 +10,7 @@ mod stopped;
 
 use super::*;
 
-/// A steel plate, 0.8 mm thick, without point supports.
+/// Steel plate, 0.8 mm thick.
 fn steel(length_m: f64, width_m: f64, edges: Edges, elements: usize) -> PlateSpec {
     PlateSpec {
         length_m,
@@ -46,8 +46,8 @@ fn deflection(plate: &Plate, sensor: Position, contact: Position) -> f64 {
     plate.influence(SensorKind::Deflection, sensor, contact)
 }
 
-/// The integral of an influence function over the plate: the reading under a uniform load of one pascal. Computed by Simpson's rule
-/// on the elements, which is exact for cubic functions.
+/// Integral of an influence function over the plate, for a load of 1 Pa, by Simpson's rule on the elements
+/// (exact for cubics).
 fn under_uniform_load(plate: &Plate, kind: SensorKind, sensor: Position) -> f64 {
     let influence = plate.influence_function(kind, sensor);
     let mesh = mesh_of(plate);
@@ -59,7 +59,7 @@ fn under_uniform_load(plate: &Plate, kind: SensorKind, sensor: Position) -> f64 
     lines.sum()
 }
 
-/// Places and weights of Simpson's rule over `count` intervals of `side_m`.
+/// Points and weights of Simpson's rule over `count` intervals of `side_m`.
 fn simpson(count: usize, side_m: f64) -> Vec<(f64, f64)> {
     let halves = 2 * count;
     let weight = |i: usize| match i {
@@ -79,7 +79,6 @@ fn orders(errors: &[f64]) -> Vec<f64> {
     errors.windows(2).map(|pair| (pair[0] / pair[1]).log2()).collect()
 }
 
-/// Relative error of `found`.
 fn off(found: f64, expected: f64) -> f64 {
     (found / expected - 1.0).abs()
 }

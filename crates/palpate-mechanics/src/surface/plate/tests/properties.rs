@@ -36,7 +36,7 @@ prop_compose! {
     fn anywhere()(x in 0.0..=LENGTH_M, y in 0.0..=WIDTH_M) -> Position { at(x, y) }
 }
 
-/// A position far enough from the edges for differences on either side.
+/// A position with room for differences on either side.
 fn inside(x: f64, y: f64) -> Position {
     at(0.01 + 0.28 * x, 0.01 + 0.18 * y)
 }

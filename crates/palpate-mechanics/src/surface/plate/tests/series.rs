@@ -1,4 +1,5 @@
-//! Plates with a series for a solution: Timoshenko and Woinowsky-Krieger, *Theory of Plates and Shells*, 2nd ed.
+//! Plates with a series as the solution: Timoshenko and Woinowsky-Krieger, *Theory of Plates and Shells*, 2nd
+//! ed.
 
 use std::f64::consts::PI;
 
@@ -32,8 +33,8 @@ fn navier_point(terms: usize) -> f64 {
     4.0 / PI.powi(4) * odd(terms).map(line).sum::<f64>()
 }
 
-/// Contribution of the moments along clamped edges to the central deflection (art. 44): E_i from one equation for each term,
-/// with the slopes of the simply supported plate as right sides.
+/// Contribution of the moments along clamped edges to the central deflection (art. 44), E_i from one equation
+/// for each term.
 fn clamping(terms: usize, right_side: impl Fn(f64) -> f64) -> f64 {
     let alpha = |m: f64| m * PI / 2.0;
     let mixed = |i: f64, m: f64| 8.0 * i / PI / m.powi(3) / (1.0 + (i / m).powi(2)).powi(2);
@@ -68,8 +69,9 @@ fn clamped_point() -> f64 {
     navier_point(1000) + clamping(20, right_side)
 }
 
-/// Central deflection under a uniform load, times D/(q·a⁴), of a square plate with simple edges at x = 0 and a and
-/// one condition on the other two (art. 41, after Lévy): Σ Y_m(0)·sin(mπ/2), with Y_m = q_m/(D·α⁴)·(1 + A·cosh αy + B·αy·sinh αy).
+/// Central deflection under a uniform load, times D/(q·a⁴), with simple edges at x = 0 and a and one
+/// condition on the others (art. 41, Lévy): Σ Y_m(0)·sin(mπ/2), with Y_m = q_m/(D·α⁴)·(1 + A·cosh
+/// αy + B·αy·sinh αy).
 fn levy_uniform(terms: usize, others: Edge, nu: f64) -> f64 {
     let term = |m: f64| {
         let u = m * PI / 2.0;
@@ -149,7 +151,7 @@ fn two_simple_edges_are_levys_series() {
     }
 }
 
-/// A patch test: a plate with supports at three corners and a load at the fourth bends into a saddle, w = −x·y/(2·D·(1 − ν)) per
+/// Patch test: a plate on three corners with a load at the fourth is the saddle w = −x·y/(2·D·(1 − ν)) per
 /// newton (art. 11), which the elements represent exactly.
 #[test]
 fn a_plate_on_three_corners_is_a_saddle() {

@@ -1,4 +1,4 @@
-//! Stopped work leaves no result.
+//! Cancelled work leaves no result.
 
 use palpate_testing::stopping::stopped_at_every_look;
 

@@ -8,7 +8,6 @@ fn stiffness() -> f64 {
     PAPER.bending_stiffness()
 }
 
-/// Asserts equality to 10⁻¹¹ of `scale`.
 fn same(found: f64, expected: f64, scale: f64) {
     assert!((found - expected).abs() <= 1e-11 * scale.abs(), "{found} instead of {expected}");
 }
@@ -39,7 +38,7 @@ fn a_cantilever() {
     }
     same(found.full_scale(Deflection), L.powi(3) / (3.0 * ei), L.powi(3) / (3.0 * ei));
     same(found.full_scale(Strain), 0.5 * PAPER.thickness_m() * L / ei, found.full_scale(Strain));
-    // With the clamp at the other end, the beam is the mirror image.
+    // With the clamp at the other end, the beam is mirrored.
     let mirrored = beam(&paper_on(&[(L, Clamped)]));
     same(at(&mirrored, Strain, L, 0.1), at(&found, Strain, 0.0, L - 0.1), found.full_scale(Strain));
     same(at(&mirrored, Slope, 0.1, 0.0), -at(&found, Slope, L - 0.1, L), found.full_scale(Slope));
@@ -52,7 +51,7 @@ fn a_propped_cantilever() {
         let prop = a * a * (3.0 * L - a) / (2.0 * L.powi(3));
         same(at(&found, Reaction, L, a), prop, 1.0);
         same(at(&found, Reaction, 0.0, a), 1.0 - prop, 1.0);
-        // The moment at the clamp is the sum of the moments of load and prop.
+        // Moment at the clamp, of load and prop.
         let root = 0.5 * PAPER.thickness_m() * (prop * L - a) / stiffness();
         same(at(&found, Strain, 0.0, a), root, found.full_scale(Strain));
     }

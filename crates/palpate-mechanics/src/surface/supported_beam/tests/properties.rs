@@ -1,4 +1,4 @@
-//! Properties of every beam.
+//! Properties of every beam on supports.
 
 use proptest::prelude::*;
 
@@ -15,7 +15,7 @@ fn any_kind() -> impl Strategy<Value = BeamSupportKind> {
     ]
 }
 
-/// Beams of one to four sections on one to five sufficient supports, with places at whole shares of the length.
+/// Beams of one to four sections on one to five sufficient supports.
 fn any_beam() -> impl Strategy<Value = SupportedBeam> {
     let sections = proptest::collection::btree_map(1..97u32, (0.5..2.0f64, 0.5..2.0f64), 0..4);
     let supports = proptest::collection::btree_map(0..=97u32, any_kind(), 1..6);
@@ -47,8 +47,8 @@ fn near_a_node(beam: &SupportedBeam, share: f64) -> bool {
     beam.structure.nodes.iter().any(|node| (node - share).abs() < 1e-3)
 }
 
-/// Upward forces and couples of the supports on the beam, with their places, for a unit force downward at `contact_m`,
-/// from the jumps of the bent beam.
+/// Positions, upward forces and couples on the beam for a unit force downward at `contact_m`, from the jumps
+/// of its shape.
 fn jumps(beam: &SupportedBeam, contact_m: f64) -> Vec<(f64, f64, f64)> {
     let l = beam.spec.length_m;
     let mut bent = beam.shape(Deflection, Position::along(contact_m)).pieces;
