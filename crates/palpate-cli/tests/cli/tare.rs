@@ -13,7 +13,7 @@ const FIRST: usize = 60;
 /// A folder with a board's rig and locator, and the board.
 fn fitted() -> (TempDir, Board) {
     let (folder, mut board) = (folder(linear_rig()), Board::new(7));
-    fs::write(folder.path().join("presses.csv"), board.calibration(84)).unwrap();
+    fs::write(folder.path().join("presses.csv"), board.calibration(48)).unwrap();
     said(&run(folder.path(), &["fit", "rig.toml", "--data", "presses.csv", "-o", "board.json"]));
     (folder, board)
 }
@@ -367,7 +367,7 @@ fn a_calibration_by_the_latest_zero_is_used_by_it() {
     let rig = linear_rig().replacen("[recording]", "[recording]\nzero = \"last\"", 1);
     assert_ne!(rig, linear_rig());
     fs::write(folder.path().join("rig.toml"), rig).unwrap();
-    fs::write(folder.path().join("presses.csv"), board.calibration(84)).unwrap();
+    fs::write(folder.path().join("presses.csv"), board.calibration(48)).unwrap();
     said(&run(folder.path(), &["fit", "rig.toml", "--data", "presses.csv", "-o", "board.json"]));
     let touches = touches(&mut board);
     fs::write(folder.path().join("touches.csv"), board.recording(&touches)).unwrap();
