@@ -5,7 +5,7 @@ import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, describe, expect, test } from "vitest";
 import { Bench } from "./bench";
 import { endAll } from "./children";
-import { dotAt, hasChromium, launch, open, picture, says } from "./chromium";
+import { FIT_MS, dotAt, hasChromium, launch, open, picture, says } from "./chromium";
 import { Server } from "./server";
 
 const SIX_TWICE: [string, string][] = [
@@ -122,11 +122,13 @@ describe.skipIf(!hasChromium())("calibration", () => {
     await picture(page, "calibration-presses");
     expect(readFileSync(bench.path("presses.csv"), "utf8")).toMatch(/^# .*; placement 1.5 mm\n/);
     await page.locator("#calibration-finish").click();
-    expect(await says(page, "calibration-step", /^Fitted to 12 presses: error at held-out positions [\d.]+ mm/)).toContain("median");
+    expect(await says(page, "calibration-step", /^Fitted to 12 presses: error at held-out positions [\d.]+ mm/, FIT_MS)).toContain("median");
     expect(existsSync(bench.path("locator.json"))).toBe(true);
     await dotUnder(page, bench, 123);
     await picture(page, "calibration-done");
     await page.locator("#calibration-check").click();
+    // Until the check has begun, the step is still that of the fit.
+    await says(page, "calibration-step", /^(Let go|Leave|Press at)/);
     await obey(page, bench, (asked, taken) => asked.startsWith("Fitted") && taken === 12);
     expect(await says(page, "calibration-checked-words", /^Error [\d.]+ mm/)).toContain("of 5 within their 95 % intervals");
     expect(await page.locator("#calibration-checked-places tr").count()).toBe(5);
@@ -175,7 +177,7 @@ describe.skipIf(!hasChromium())("calibration", () => {
     expect(presses(bench)).toBe(10);
     bench.lift();
     await page.keyboard.press("f");
-    await says(page, "calibration-step", /^Fitted to 10 presses/);
+    await says(page, "calibration-step", /^Fitted to 10 presses/, FIT_MS);
     await dotUnder(page, bench, 250);
     await picture(page, "calibration-phone-done");
     expect(faults).toEqual([]);

@@ -55,6 +55,9 @@ export async function picture(page: Page, name: string): Promise<void> {
   await page.screenshot({ path: `${PICTURES}/${name}.png`, fullPage: true });
 }
 
+/** Longest wait for a fit, in milliseconds: it is computed beside a browser on two cores. */
+export const FIT_MS = 90_000;
+
 /** Waits until an element has such a text, and gives all of it. */
 export async function says(page: Page, id: string, text: RegExp, timeout = 30_000): Promise<string> {
   await page.waitForFunction(

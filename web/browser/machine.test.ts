@@ -5,7 +5,7 @@ import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, describe, expect, test } from "vitest";
 import { CLOCK_SPEED, MachineBench } from "./bench";
 import { endAll } from "./children";
-import { dotAt, hasChromium, launch, open, picture, says } from "./chromium";
+import { FIT_MS, dotAt, hasChromium, launch, open, picture, says } from "./chromium";
 import { Server } from "./server";
 
 /** Waits until so many presses were taken. */
@@ -71,7 +71,7 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
     await says(page, "calibration-step", /^All presses are taken$/);
     expect(presses(bench)).toBe(18);
     await page.locator("#calibration-finish").click();
-    await says(page, "calibration-step", /^Fitted to 18 presses: error at held-out positions [\d.]+ mm/);
+    await says(page, "calibration-step", /^Fitted to 18 presses: error at held-out positions [\d.]+ mm/, FIT_MS);
     expect(existsSync(bench.path("locator.json"))).toBe(true);
     await page.locator("#calibration-check").click();
     await says(page, "calibration-checked-words", /\(median\).* of 5 within their 95 % intervals/);
@@ -114,7 +114,7 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
     await says(page, "calibration-step", /^All presses are taken$/, 90_000);
     expect(presses(bench)).toBe(36);
     await page.keyboard.press("f");
-    await says(page, "calibration-step", /^Fitted to 36 presses/);
+    await says(page, "calibration-step", /^Fitted to 36 presses/, FIT_MS);
     expect(faults).toEqual([]);
   });
 
