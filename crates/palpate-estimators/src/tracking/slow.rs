@@ -212,14 +212,16 @@ impl SlowState {
     }
 
     pub fn move_baseline(&mut self, by: &[f64]) {
-        let Some(drift) = &mut self.drift else { return };
         let moved: Vec<f64> = self.noise.iter().map(|(channel, noise)| by[*channel] / noise).collect();
         let is_new = moved.iter().any(|moved| moved.abs() > 1.0);
+        if is_new {
+            self.creep.iter_mut().for_each(|(_, states)| states.fill(0.0));
+        }
+        let Some(drift) = &mut self.drift else { return };
         if is_new {
             self.block = Block::default();
             // A new baseline, with the noise of its readings.
             *drift = DriftFilter::new(drift.config, &vec![1.0; self.noise.len()]);
-            self.creep.iter_mut().for_each(|(_, states)| states.fill(0.0));
         } else {
             drift.move_by(&moved);
             self.block

@@ -8,6 +8,7 @@ use std::sync::Arc;
 mod drift;
 mod on_plane;
 
+use super::slow::SlowState;
 use super::*;
 use crate::estimator::Locator;
 use crate::fit::{Fit, FitTask};
@@ -337,6 +338,29 @@ fn a_baseline_that_moves_moves_no_contact() {
             assert!((still.sd[0] - moving.sd[0]).abs() < 1e-7, "{i}");
         }
     }
+}
+
+#[test]
+fn a_new_baseline_restarts_creep_without_a_drift() {
+    let rig = rig();
+    let likelihood = likelihood(&rig, Some(3.0));
+    let noise: Vec<f64> = rig.setup.layout().sensors().iter().map(|sensor| sensor.channel.noise_sd).collect();
+    let creep = Creep { share: 0.2, time_s: 10.0 };
+    let mut slow = SlowState::new(&likelihood, noise.len(), None, Some(creep));
+    let corrected = |slow: &mut SlowState, time_s: f64, size: f64| {
+        let (mut whitened, mut reading) = (vec![size; noise.len()], vec![0.0; noise.len()]);
+        slow.take_off(time_s, Some(1.0), &mut whitened, &mut reading);
+        whitened
+    };
+    for second in 0..60 {
+        corrected(&mut slow, f64::from(second), 100.0);
+    }
+    let small: Vec<f64> = noise.iter().map(|noise| 0.1 * noise).collect();
+    slow.move_baseline(&small);
+    assert!(corrected(&mut slow, 60.0, 0.0).iter().all(|value| *value < -1.0));
+    let large: Vec<f64> = noise.iter().map(|noise| 5.0 * noise).collect();
+    slow.move_baseline(&large);
+    assert!(corrected(&mut slow, 61.0, 0.0).iter().all(|value| *value == 0.0));
 }
 
 /// Beside an end, force and position of a constant contact trade off; they stay within the calibration's
