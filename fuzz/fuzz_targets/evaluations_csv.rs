@@ -1,4 +1,4 @@
-//! Any text, read as the evaluations that an earlier run of a study left, or a shard of it.
+//! Any text as the evaluations of an earlier run or shard of a study.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -32,7 +32,7 @@ fuzz_target!(|text: &str| {
         let again = tables.read(&whole).expect("a table that was written is read");
         assert_eq!(tables.whole(&again.done), whole);
     }
-    // As a shard: its number is in the first line.
+    // As a shard, with the number in the first line.
     let shard = Shard::new(1, 1).expect("the only shard");
     let mut texts = StudyTables::of_shard(&STUDY, shard, 2).headings();
     texts.evaluations += text;

@@ -1,4 +1,4 @@
-//! Any bytes, looked at as a table and as a recording that a first rig is guessed for: a rig that is written loads and reads its file.
+//! Any bytes as a recording for a first rig: a written rig loads and reads the file.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,4 @@
-//! Any bytes, decoded as frames whole and cut: how they are cut changes nothing.
+//! Any bytes as frames: chunks do not change the result.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,5 @@
-//! Any bytes as the replies of a machine: no panic, no move without an `ok` for every command before it, and none below the deepest press.
+//! Any bytes as replies of a machine: no panic, no move before the `ok` of every earlier command,
+//! none below the deepest press.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -14,10 +15,10 @@ static STAGE: LazyLock<Stage> = LazyLock::new(|| {
     rig.stage.expect("it has a machine")
 });
 
-/// Time that a read takes, by the line's own clock.
+/// Duration of a read.
 const READ: Duration = Duration::from_millis(10);
 
-/// A line to a machine whose replies are known beforehand; at their end it has gone.
+/// A line to a machine with fixed replies; at their end it is disconnected.
 #[derive(Clone)]
 struct Line {
     replies: Arc<Mutex<Vec<u8>>>,

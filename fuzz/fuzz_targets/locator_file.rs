@@ -1,4 +1,4 @@
-//! Any text, read as a locator; what is accepted can locate.
+//! Any text as a locator; an accepted one locates.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,7 +1,7 @@
-//! Locators of every kind with some of their numbers put wrong; what is accepted answers any reading, and in numbers.
+//! Locators of every kind with corrupt numbers; an accepted one answers any reading with numbers.
 //!
-//! The first byte names the kind; then come records of eleven bytes: two for which number, one for what it becomes, eight for a float; the
-//! readings are of the last float.
+//! The first byte selects the kind. Records of eleven bytes follow: two select a number, one the
+//! kind of corruption, eight are a float. The readings are the last float.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -28,10 +28,9 @@ const KINDS: [&str; 10] = [
     golden!("network-lm"),
 ];
 
-/// Bytes of a record.
 const RECORD: usize = 11;
 
-/// What a record makes of a number: one of the known bad ones, any float, or a whole number.
+/// Returns an invalid number, any float, or a whole number.
 fn number(choice: u8, float: f64) -> Value {
     match usize::from(choice) {
         known if known < HOSTILE.len() => serde_json::from_str(HOSTILE[known]).unwrap_or_default(),

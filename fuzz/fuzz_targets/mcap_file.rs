@@ -1,4 +1,4 @@
-//! Any bytes, read as a recording: refused in words, or read to its end.
+//! Any bytes as an MCAP recording: refused with a message, or read to the end.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -6,7 +6,7 @@ use palpate_live::recording::{Playback, read, recover};
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
-/// A file of this process, which every input is written over.
+/// A file of this process, which every input overwrites.
 static PATH: LazyLock<PathBuf> =
     LazyLock::new(|| std::env::temp_dir().join(format!("palpate-fuzz-{}.mcap", std::process::id())));
 

@@ -1,4 +1,4 @@
-//! Any text, read as the networks that an earlier run of a study left.
+//! Any text as the networks of an earlier run of a study.
 #![no_main]
 
 use palpate_numerics::watch::Watch;

@@ -1,4 +1,4 @@
-//! Any bytes, read as a recording and as a stream of readings.
+//! Any bytes as a recording and as a stream of readings.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -21,11 +21,12 @@ fuzz_target!(|bytes: &[u8]| {
         let _ = parser.parse_line(line);
     }
     let _ = parser.progress().unfound();
-    // Columns by their numbers below a heading, with forces: preambles, units, totals, forces that are 0 but for noise.
+    // Columns by number below a heading, with forces: preambles, units, totals, forces that are 0
+    // apart from noise.
     let channels = 3..3 + RIG.setup.layout().len();
     let columns = Columns { header: Header::Present, ..Columns::along(1, channels).force(2) };
     let _ = read("fuzz", bytes, &RIG.setup.schema(&columns));
-    // UTF-16 in any chunks is that in one.
+    // Chunks do not change decoded UTF-16.
     let whole = decoded(bytes, bytes.len().max(1));
     assert_eq!(decoded(bytes, 3), whole);
 });

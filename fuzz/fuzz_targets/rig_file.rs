@@ -1,4 +1,4 @@
-//! Any text, read as a rig.
+//! Any text as a rig.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

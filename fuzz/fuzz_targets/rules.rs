@@ -1,4 +1,4 @@
-//! Any text, read as a rule file: an error's place lies in the text, and a rule that is accepted can be published.
+//! Any text as a rule file: errors are within the text, and accepted rules can be published.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,4 @@
-//! Any text, read as the URL of a source: one reads back as it is shown, and no message shows a password.
+//! Any text as the URL of a source: it reads back as displayed, and no message shows a password.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

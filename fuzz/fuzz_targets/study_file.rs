@@ -1,4 +1,4 @@
-//! Any text, read as a study.
+//! Any text as a study.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

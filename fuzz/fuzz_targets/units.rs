@@ -1,4 +1,4 @@
-//! Any text, read as a quantity.
+//! Any text as a quantity.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

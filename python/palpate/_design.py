@@ -115,7 +115,7 @@ class _Design(Section):
     force: str | None = key()
 
     def _unit_of(self, field: dataclasses.Field[Any]) -> str | None:
-        # A number of sites is none of metres.
+        # An integer is the number of sites, without a unit.
         is_count = field.name == "sites" and isinstance(self.sites, int)
         return None if is_count else super()._unit_of(field)
 

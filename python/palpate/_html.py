@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 _WIDTH = 560.0
 _MARGIN = 24.0
 _ROWS = 10
-# Units of readings in tables, and how many of each the SI's has.
+# Units of readings in tables, and their number per SI unit.
 _UNITS = {"deflection": ("mm", 1e3), "slope": ("mrad", 1e3), "strain": ("um/m", 1e6), "reaction": ("N", 1.0), "raw": ("", 1.0)}
-# Colours of what sensors measure: those of the figures.
+# Colours of sensor types, as in the figures.
 _COLOURS = {"deflection": "#009e73", "slope": "#d55e00", "strain": "#0072b2", "reaction": "#cc79a7"}
 
 

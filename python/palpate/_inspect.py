@@ -13,7 +13,7 @@ from . import _palpate
 from ._palpate import Locator, Recording, Rig, Setup, Training
 
 
-# Endings of the names of tables.
+# File name extensions of tables.
 _TABLES = {".csv", ".txt", ".tsv", ".dat", ".lvm"}
 
 

@@ -40,7 +40,7 @@ def _bar() -> Shown:
     except ImportError:
         return _Line()
     if _in_notebook():
-        # Without ipywidgets a notebook shows the bar of a terminal.
+        # Without ipywidgets, a notebook shows the terminal bar.
         if importlib.util.find_spec("ipywidgets") is not None:
             from tqdm.notebook import tqdm as notebook_bar
 

@@ -7,7 +7,7 @@ import json
 import math
 from typing import Any, ClassVar
 
-# Units in which a plain number is written; they are those of the SI.
+# SI units of plain numbers.
 LENGTH = "m"
 FORCE = "N"
 MODULUS = "Pa"
@@ -77,7 +77,7 @@ def toml_value(value: Any, unit: str | None, name: str) -> str:
     if isinstance(value, slice):
         raise TypeError(f"`{name}` is a slice; it must be a number, a text with a unit, or a list of them")
     if hasattr(value, "tolist"):
-        value = value.tolist()  # NumPy's arrays and numbers.
+        value = value.tolist()  # NumPy arrays and scalars.
     if isinstance(value, (list, tuple, range)):
         return "[" + ", ".join(toml_value(item, unit, name) for item in value) + "]"
     if isinstance(value, int):

@@ -32,7 +32,7 @@ Block = tuple[str, int, int]
 AnyExecutor = Union[Executor, Callable[[], Executor]]
 
 _NETWORKS, _EVALUATIONS, _RESULTS, _SHARD = "networks.csv", "evaluations.csv", "results.json", "shard.json"
-# New executors in a row that lose their workers before any fit is finished.
+# Largest number of consecutive executors that lose their workers before a fit is finished.
 _MOST_BROKEN = 3
 _LOOK_SECONDS = 0.1
 
@@ -303,7 +303,7 @@ class StudyResults(Result):
         for name, values in spreads.items():
             for index, of in enumerate(("median", "p05", "p95")):
                 columns[f"{of} {name}"] = values[:, index]
-        # What no arm has is left out.
+        # Columns without a value in any arm are omitted.
         return {name: values for name, values in columns.items() if name == "arm" or not np.isnan(values).all()}
 
     def __repr__(self) -> str:
@@ -373,7 +373,7 @@ class _Run:
                 if bar is not None:
                     bar.update("fits", float(total - left), float(total))
         except BrokenExecutor as error:
-            # What others finished before is not lost with the executor.
+            # Results of finished tasks survive the loss of the executor.
             for future in pending:
                 if future.done() and not future.cancelled() and future.exception() is None:
                     self._take(future.result())

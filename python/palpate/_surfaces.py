@@ -18,7 +18,7 @@ from ._sections import (
 )
 
 Quantity = Union[float, str]
-# The most memory that work may need: bytes, or a text such as "2 GB"; no limit where nothing is said.
+# Memory limit of a computation: bytes, or a text such as "2 GB"; None for no limit.
 Memory = Union[float, str, None]
 """A number in SI units, or a text with a unit: ``0.4`` and ``"400 mm"`` are the same length."""
 

@@ -1,4 +1,4 @@
-//! Arrays: readings and columns of numbers in, checked, without a copy where they are C-contiguous arrays of 64-bit floats; positions out.
+//! Conversion of arrays: C-contiguous arrays of 64-bit floats are not copied.
 
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray,
@@ -11,19 +11,17 @@ use pyo3::types::{PySlice, PyType};
 
 use crate::errors::refused;
 
-/// Readings as they were given: one, or a row each.
 pub enum Readings<'py> {
-    /// One reading, of the shape (channels).
+    /// Shape (channels).
     One(PyReadonlyArray1<'py, f64>),
-    /// Many, of the shape (readings, channels).
+    /// Shape (readings, channels).
     Many(PyReadonlyArray2<'py, f64>),
 }
 
-/// Readings by these channels, of which there is at least one: an array of the shape (channels) or (readings, channels), or whatever makes
-/// one; of a data frame the columns of the channels.
+/// Converts at least one reading: an array-like, or a data frame with the channels as columns.
 ///
 /// # Errors
-/// `ValueError` with shapes and bounds for another shape, and for an object that is not an array of numbers.
+/// `ValueError` for another shape, and for an object that is not an array of numbers.
 pub fn readings<'py>(value: &Bound<'py, PyAny>, channels: &[String]) -> PyResult<Readings<'py>> {
     let readings = readings_or_none(value, channels)?;
     match &readings {
@@ -35,10 +33,10 @@ pub fn readings<'py>(value: &Bound<'py, PyAny>, channels: &[String]) -> PyResult
     }
 }
 
-/// Like it, and there may be no readings.
+/// Converts any number of readings.
 ///
 /// # Errors
-/// As of [`readings`], but for the number of rows.
+/// As for [`readings`], except for the number of rows.
 pub fn readings_or_none<'py>(value: &Bound<'py, PyAny>, channels: &[String]) -> PyResult<Readings<'py>> {
     let array = if is_plain(value) {
         value.clone()
@@ -55,7 +53,8 @@ pub fn readings_or_none<'py>(value: &Bound<'py, PyAny>, channels: &[String]) -> 
     Ok(Readings::Many(many.readonly()))
 }
 
-/// Whether a value is an array of 64-bit floats that can be read as it lies in memory: not masked, of one or two dimensions, C-contiguous.
+/// Returns true for an array that is readable in memory: unmasked, one- or two-dimensional,
+/// C-contiguous, 64-bit floats.
 fn is_plain(value: &Bound<'_, PyAny>) -> bool {
     let exact = |class: Bound<'_, PyType>| value.get_type().is(&class);
     if let Ok(array) = value.cast::<PyArray1<f64>>() {
@@ -77,10 +76,10 @@ fn check_channels(shape: &[usize], found: usize, channels: &[String]) -> PyResul
     )))
 }
 
-/// The numbers of a column of `rows` rows.
+/// Converts a column of `rows` numbers.
 ///
 /// # Errors
-/// `ValueError` for another length, and for an object that is not an array of numbers.
+/// `ValueError` for another length, and for other objects.
 pub fn column(value: &Bound<'_, PyAny>, name: &str, rows: usize) -> PyResult<Vec<f64>> {
     let numbers = numbers(value, name)?;
     if numbers.len() != rows {
@@ -89,16 +88,15 @@ pub fn column(value: &Bound<'_, PyAny>, name: &str, rows: usize) -> PyResult<Vec
     Ok(numbers)
 }
 
-/// The numbers of an array of one dimension, of any length; each may be a text with a unit.
+/// Converts an array of one dimension; an element may be a text with a unit.
 ///
 /// # Errors
-/// `ValueError` for an object that is not an array of numbers.
+/// `ValueError` for other objects.
 pub fn numbers(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<f64>> {
     let array = value.py().import("palpate._arrays")?.call_method1("column", (value, name))?;
     Ok(array.cast::<PyArray1<f64>>()?.readonly().as_slice()?.to_vec())
 }
 
-/// Indices of rows, from a slice, indices or booleans.
 pub fn row_indices(rows: &Bound<'_, PyAny>, count: usize) -> PyResult<Vec<usize>> {
     if let Ok(slice) = rows.cast::<PySlice>() {
         let indices = slice.indices(count as isize)?;
@@ -127,7 +125,7 @@ pub fn row_indices(rows: &Bound<'_, PyAny>, count: usize) -> PyResult<Vec<usize>
     each.collect()
 }
 
-/// Positions in metres: of the shape (positions), or (positions, 2) on a plane.
+/// Shape (positions), or (positions, 2) on a plane.
 pub fn positions_array<'py>(
     py: Python<'py>,
     positions: &[Position],
@@ -145,7 +143,6 @@ pub fn positions_array<'py>(
     }
 }
 
-/// A shape as Python writes it: "(3,)", "(100, 8)".
 fn in_words(shape: &[usize]) -> String {
     match shape {
         [one] => format!("({one},)"),

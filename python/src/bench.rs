@@ -1,4 +1,4 @@
-//! The bench: setups, and the recordings of their sensors.
+//! Setups, and recordings of their sensors.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -588,7 +588,7 @@ impl Setup {
         self.0.surface().extent()
     }
 
-    /// Forces of so many contacts that press: one of each, or one for all.
+    /// One force for each contact, or one for all.
     fn forces(&self, force: Option<Bound<'_, PyAny>>, count: usize) -> PyResult<Vec<f64>> {
         let forces_n = self.row_forces(force, count)?;
         let each = forces_n
@@ -604,7 +604,7 @@ impl Setup {
         .collect()
     }
 
-    /// Forces of rows: those that are given, one for all, or the setup's.
+    /// Given forces, one for all, or the setup's.
     fn row_forces(&self, force: Option<Bound<'_, PyAny>>, rows: usize) -> PyResult<Vec<Option<f64>>> {
         match force {
             None => Ok(vec![self.0.force_n(); rows]),
@@ -617,8 +617,7 @@ impl Setup {
     }
 }
 
-/// Nuisance coordinates, a row each.
-/// Refuses a setup whose readings have another zero than the recorded one: only files are known to have readings as recorded.
+/// Refuses a setup with `zero`: only files contain readings as recorded.
 pub fn check_zero(setup: &setup::Setup) -> PyResult<()> {
     match setup.recording_columns().zero {
         Zero::None => Ok(()),
@@ -857,7 +856,7 @@ impl Recording {
     }
 }
 
-/// A row as values that Python pickles: position, force, nuisances, time, reading.
+/// Position, force, nuisances, time and reading.
 type PackedRow = ((f64, f64), Option<f64>, Vec<f64>, Option<f64>, Vec<f64>);
 
 fn packed(row: &Row) -> PackedRow {
@@ -870,7 +869,6 @@ fn unpacked(((x_m, y_m), force_n, nuisances, time_s, reading): PackedRow) -> Row
 }
 
 impl Recording {
-    /// The recording as CSV; its first line gives its source.
     fn csv(&self) -> PyResult<Vec<u8>> {
         let version = env!("CARGO_PKG_VERSION");
         let seed = self.inner.provenance.seed.map_or_else(String::new, |seed| format!(", seed {seed}"));

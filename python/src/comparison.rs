@@ -1,4 +1,4 @@
-//! Estimators at positions held out: one of them, or all beside each other.
+//! Errors of one or all estimators at held-out positions.
 
 use std::time::Instant;
 
@@ -24,7 +24,7 @@ use crate::training::Training;
 use crate::values::Fields;
 use crate::work;
 
-/// Splits of a recording by its folds, with drift taken off what they hold out where that is asked for.
+/// Splits by folds; `tare` corrects held-out readings for drift.
 fn folds(
     setup: &setup::Setup,
     recording: &recording::Recording,
@@ -82,7 +82,7 @@ pub fn cross_validate(
     Ok(Evaluation::new(in_order(evaluation, &recording.inner, count)?, setup.clone(), about))
 }
 
-/// Answers fold by fold in the order of the recording's rows.
+/// Sorts the answers of folds by the recording's rows.
 fn in_order(
     mut evaluation: evaluation::Evaluation,
     recording: &recording::Recording,
@@ -159,7 +159,7 @@ pub fn compare<'py>(
         let known = known.join(", ");
         refused(format!("`only` names \"{name}\", which does not suit the bench; it can be: {known}"))
     })?;
-    // Alone it is refused; among others it is left out.
+    // A single estimator is refused; among several it is omitted.
     if let ([only], Some(trial)) = (&contenders[..], trials.first()) {
         check_memory(memory_limit, only, bench, &trial.training)?;
     }
@@ -203,7 +203,6 @@ pub fn compare<'py>(
     Ok(fields.into_dict())
 }
 
-/// A column for each figure, a row for each estimator.
 fn columns(fields: &Fields<'_>, comparisons: &[Comparison], tolerance_m: f64) -> PyResult<()> {
     let summaries: Vec<Option<ErrorSummary>> =
         comparisons.iter().map(|comparison| comparison.tried.evaluation.summary(None)).collect();

@@ -1,4 +1,5 @@
-//! Errors as Python's: `palpate.PalpateError`, a `ValueError` with palpate's own words, and carets where a file or a text is at fault.
+//! Errors in Python: `palpate.PalpateError`, a `ValueError` with the message and, for a text,
+//! carets.
 
 use std::error::Error;
 use std::fmt::Display;
@@ -15,15 +16,13 @@ use pyo3::prelude::*;
 import_exception!(palpate._errors, PalpateError);
 import_exception!(palpate._errors, FileError);
 
-/// A value that is refused.
 pub fn refused(error: impl Display) -> PyErr {
     PalpateError::new_err(error.to_string())
 }
 
-/// The error of a file that the system does not let be read or written.
 pub fn io_error(error: &std::io::Error, path: &Path) -> PyErr {
     match error.raw_os_error() {
-        // `OSError` makes of the number what it is: FileNotFoundError, PermissionError.
+        // `OSError` selects the subclass by the number: FileNotFoundError, PermissionError.
         Some(number) => {
             let text = error.to_string();
             let words = text.split(" (os error").next().unwrap_or_default().to_owned();
@@ -33,7 +32,7 @@ pub fn io_error(error: &std::io::Error, path: &Path) -> PyErr {
     }
 }
 
-/// A rig or study, or sections of one, that cannot be used; `text` is what was read.
+/// `text` is the input of the rig, study or sections.
 pub fn of_rig(error: &RigError, source: &str, text: &str) -> PyErr {
     let mut message = error.to_string();
     if let Some(help) = error.help() {
@@ -49,7 +48,6 @@ pub fn of_rig(error: &RigError, source: &str, text: &str) -> PyErr {
     at_place(&message, source, line, line_text, span.start - start..span.end - start)
 }
 
-/// A recording that cannot be read.
 pub fn of_csv(error: &CsvError) -> PyErr {
     let source = &error.source_name;
     match &error.place {
@@ -58,7 +56,6 @@ pub fn of_csv(error: &CsvError) -> PyErr {
     }
 }
 
-/// A locator's file that cannot be read; `text` is what was read.
 pub fn of_locator(error: &LocatorFileError, source: &str, text: &str) -> PyErr {
     let Some((line, column)) = error.place() else {
         return FileError::new_err((format!("{source}: {error}"), source.to_owned()));
@@ -67,10 +64,9 @@ pub fn of_locator(error: &LocatorFileError, source: &str, text: &str) -> PyErr {
     at_place(error, source, line, line_text, column - 1..column)
 }
 
-/// The longest part of a line that is shown, in characters; a locator's file may have much longer ones.
 const SHOWN: usize = 120;
 
-/// An error at a place: the line below the message, with carets under the bytes that are meant.
+/// The line is below the message, with carets under the span.
 fn at_place(message: impl Display, source: &str, line: usize, line_text: &str, span: Range<usize>) -> PyErr {
     let floor = |at: usize| {
         let at = at.min(line_text.len());
@@ -91,7 +87,7 @@ fn at_place(message: impl Display, source: &str, line: usize, line_text: &str, s
     FileError::new_err((text, source.to_owned(), line, column))
 }
 
-/// An error of long work: that of its own, with what caused it where its words do not say that.
+/// Adds the cause if the message does not contain it.
 pub fn of_work(error: &(dyn Error + 'static)) -> PyErr {
     refused(error)
 }

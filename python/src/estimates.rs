@@ -1,4 +1,4 @@
-//! Estimates: of one reading with its numbers, of many with their columns.
+//! Estimates of one and of many readings.
 
 use numpy::ndarray::ArrayView1;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, ToPyArray};
@@ -13,7 +13,7 @@ use pyo3::types::{PyDict, PyList};
 
 use crate::errors::refused;
 
-/// The statuses, in the order of their codes in a column.
+/// In the order of their codes.
 const STATUSES: [Status; 5] =
     [Status::Located, Status::NoContact, Status::Ambiguous, Status::OutsideModel, Status::OutsideSurface];
 
@@ -147,7 +147,6 @@ impl Estimate {
     }
 }
 
-/// A contact as a dict.
 fn contact_dict<'py>(
     py: Python<'py>,
     contact: &ContactEstimate,
@@ -162,7 +161,7 @@ fn contact_dict<'py>(
     Ok(dict)
 }
 
-/// Rows of estimates that are yet to be set, in the columns' memory.
+/// Rows of estimates in the columns' memory.
 pub struct Rows<'a> {
     x_m: &'a mut [f64],
     y_m: &'a mut [f64],
@@ -171,19 +170,17 @@ pub struct Rows<'a> {
     y_95_m: &'a mut [f64],
     covariance: &'a mut [f64],
     status: &'a mut [u8],
-    /// Empty while no row has one.
+    /// Empty until a row has one.
     force_95_n: Vec<[f64; 2]>,
-    /// Modes and further contacts of the few rows that have them, by row.
+    /// Modes and further contacts, by row.
     several: Vec<(usize, estimator::Estimate)>,
 }
 
-/// Entries of a covariance that there are on a line: xx, xf, ff.
+/// Entries of a covariance on a line: xx, xf, ff.
 const ON_LINE: [usize; 3] = [0, 2, 5];
 
-/// An unknown number, in a column.
 const UNKNOWN: f64 = f64::NAN;
 
-/// The uncertainty of a contact that has none: every number unknown.
 const NO_UNCERTAINTY: Uncertainty = Uncertainty {
     covariance: [UNKNOWN; 6],
     x_95_m: (UNKNOWN, UNKNOWN),
@@ -192,7 +189,6 @@ const NO_UNCERTAINTY: Uncertainty = Uncertainty {
 };
 
 impl Rows<'_> {
-    /// Sets a row.
     pub fn set(&mut self, row: usize, estimate: &estimator::Estimate) {
         let contact = &estimate.contact;
         let uncertainty = contact.uncertainty.as_ref().unwrap_or(&NO_UNCERTAINTY);
@@ -220,12 +216,12 @@ impl Rows<'_> {
     }
 }
 
-/// Covariance of (x, y, force), row by row, from its upper triangle xx, xy, xf, yy, yf, ff.
+/// Row by row, for (x, y, force).
 fn square([xx, xy, xf, yy, yf, ff]: [f64; 6]) -> [f64; 9] {
     [xx, xy, xf, xy, yy, yf, xf, yf, ff]
 }
 
-/// Upper triangle of a covariance from a row of the column: six entries on a plane, those of [`ON_LINE`] on a line.
+/// Six entries on a plane, those of [`ON_LINE`] on a line.
 fn upper_triangle(row: ArrayView1<'_, f64>) -> [f64; 6] {
     match row.len() {
         6 => std::array::from_fn(|i| row[i]),
@@ -233,7 +229,6 @@ fn upper_triangle(row: ArrayView1<'_, f64>) -> [f64; 6] {
     }
 }
 
-/// The six entries of a covariance on a line; all unknown where those are.
 fn whole(on_line: [f64; 3]) -> [f64; 6] {
     let mut all = [if on_line[0].is_nan() { UNKNOWN } else { 0.0 }; 6];
     ON_LINE.into_iter().zip(on_line).for_each(|(i, entry)| all[i] = entry);
@@ -269,9 +264,9 @@ pub struct Estimates {
 }
 
 impl Estimates {
-    /// Estimates of so many readings, which `fill` sets row by row.
+    /// Estimates of `rows` readings, which `fill` sets.
     ///
-    /// The columns are NumPy's memory: of large pages, which take half as long to be written for the first time.
+    /// NumPy's memory has large pages, which halves the time of the first write.
     pub fn filled(
         py: Python<'_>,
         rows: usize,
@@ -363,7 +358,7 @@ impl Estimates {
         let rows = own.outer_iter().zip(forces.iter()).zip(variances.outer_iter());
         let ends: Vec<[f64; 2]> = rows
             .map(|((own, force_n), variances)| {
-                // The variance of the force is the last entry, on a line as on a plane.
+                // The variance of the force is the last entry, on a line and on a plane.
                 let sd_n = variances[variances.len() - 1].sqrt();
                 match (own[0].is_nan(), sd_n > 0.0 && sd_n.is_finite() && !force_n.is_nan()) {
                     (false, _) => [own[0], own[1]],
@@ -473,7 +468,7 @@ impl Estimates {
     }
 }
 
-/// The columns: x, y, force, x_95, y_95, force_95, covariance, codes of the statuses.
+/// x, y, force, x_95, y_95, force_95, covariance, codes of the statuses.
 type Columns = (
     Py<PyArray1<f64>>,
     Option<Py<PyArray1<f64>>>,
@@ -485,10 +480,10 @@ type Columns = (
     Py<PyArray1<u8>>,
 );
 
-/// A contact as values that Python pickles: x, y, force; and of its uncertainty the covariance and the intervals of x, y and force.
+/// x, y, force, covariance and intervals of x, y and force.
 type PackedContact = (f64, f64, Option<f64>, Option<([f64; 6], [f64; 2], [f64; 2], Option<[f64; 2]>)>);
 
-/// Row, code of the status, the contact, the modes with their probabilities, and further contacts.
+/// Row, status code, contact, modes with probabilities, further contacts.
 type PackedSeveral = (usize, u8, PackedContact, Vec<(PackedContact, f64)>, Vec<PackedContact>);
 
 fn packed((row, estimate): &(usize, estimator::Estimate)) -> PackedSeveral {
@@ -542,7 +537,6 @@ impl Estimates {
         )
     }
 
-    /// The estimate in a row.
     fn row(&self, py: Python<'_>, at: usize) -> PyResult<Estimate> {
         if let Ok(index) = self.several.binary_search_by_key(&at, |(row, _)| *row) {
             return Ok(Estimate::new(self.several[index].1, self.extent));

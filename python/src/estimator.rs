@@ -1,4 +1,4 @@
-//! Estimators of a setup, and how they are fitted.
+//! Estimators of a setup, and their fit.
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -29,10 +29,10 @@ pub struct Estimator {
     text: Option<String>,
 }
 
-/// Refuses a fit that is estimated to need more memory than the limit, where there is one.
+/// Refuses a fit above the memory limit, if any.
 ///
 /// # Errors
-/// `PalpateError` with the need, the limit, and the estimators that need less.
+/// `PalpateError` with the need, the limit, and cheaper estimators.
 pub fn check_memory(
     limit: Option<&Bound<'_, PyAny>>,
     estimator: &estimator::Estimator,
@@ -207,12 +207,11 @@ impl Estimator {
     }
 }
 
-/// Seeds that several threads take from one list, and what this thread has made of its own.
 struct Seeds<'a> {
     seeds: &'a [u64],
-    /// Index of the next seed that no thread has taken.
+    /// Index of the next free seed.
     next: &'a AtomicUsize,
-    /// Indices of the seeds that this thread has taken and not finished.
+    /// Unfinished seeds of this thread.
     taken: Vec<usize>,
     done: Vec<(usize, estimator::Locator)>,
 }
@@ -232,7 +231,7 @@ impl SeedQueue<estimator::Locator> for Seeds<'_> {
     }
 }
 
-/// What the choice of `auto` was made by: the chosen kind, what every contender came to, and who was left out.
+/// Chosen kind, figures of the contenders, and omitted kinds.
 fn choice_dict<'py>(py: Python<'py>, choice: &Choice) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("best", choice.best.name())?;

@@ -1,4 +1,4 @@
-//! Evaluations: true contacts beside the estimates of a locator.
+//! Evaluations: true contacts and estimates of a locator.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ pub struct Evaluation {
     about: About,
 }
 
-/// Figures of errors, in metres, by name.
+/// Figures by name, in metres.
 pub const FIGURES: [(&str, Figure); 5] = [
     ("mean", |errors| errors.average_m),
     ("median", |errors| errors.median_m),
@@ -35,17 +35,13 @@ pub const FIGURES: [(&str, Figure); 5] = [
     ("max", |errors| errors.largest_m),
 ];
 
-/// A figure of errors, in metres.
 pub type Figure = fn(&ErrorSummary) -> f64;
 
-/// What was judged by what.
 #[derive(Clone)]
 pub struct About {
-    /// Kind of the estimator.
     pub kind: String,
-    /// Name of the recording.
     pub source: String,
-    /// How its contacts were located, in words.
+    /// Use of the recording.
     pub how: String,
 }
 
@@ -378,14 +374,13 @@ impl Evaluation {
     }
 }
 
-/// Four digits that matter.
 fn figure(value: f64) -> String {
     let four: f64 = format!("{value:.3e}").parse().unwrap_or(value);
     four.to_string()
 }
 
-/// A contact as values that Python pickles: truth, force, estimate, whether it is covered, interval score, number of the status in
-/// `Status::ALL`, estimated force and whether that is covered.
+/// Truth, force, estimate, coverage, interval score, index in `Status::ALL`, and estimated force
+/// with coverage.
 type PackedContact =
     ((f64, f64), Option<f64>, (f64, f64), Option<bool>, Option<f64>, Option<usize>, Option<(f64, bool)>);
 

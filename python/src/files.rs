@@ -1,4 +1,4 @@
-//! Files: written whole, under a temporary name first.
+//! Atomic writing of files.
 
 use std::path::Path;
 
@@ -6,12 +6,12 @@ use pyo3::prelude::*;
 
 use crate::errors::{io_error, refused};
 
-/// Writes a whole file, which takes its name when all of it is there.
+/// Writes a temporary file and renames it.
 ///
 /// # Errors
 /// `PalpateError` for a path that is not a file, and `OSError`.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> PyResult<()> {
-    // A link is followed: its target is what is meant.
+    // A link stays, and its target is replaced.
     let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let mut name = target.file_name().map(ToOwned::to_owned).unwrap_or_default();
     if target.exists() && !target.is_file() {
@@ -21,7 +21,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> PyResult<()> {
     let temporary = target.with_file_name(name);
     let written = std::fs::write(&temporary, bytes).and_then(|()| std::fs::rename(&temporary, &target));
     written.map_err(|error| {
-        // A file that is half-written is of no use; the first error is reported.
+        // A half-written file is of no use; the first error is reported.
         let _ = std::fs::remove_file(&temporary);
         io_error(&error, path)
     })

@@ -1,4 +1,4 @@
-//! Influence functions that a locator has learnt, as Python's own values.
+//! Learnt influence functions as values of Python.
 
 use numpy::{PyArray1, PyArrayMethods};
 use palpate::estimators::influence::InfluencesAtNodes;
@@ -8,7 +8,7 @@ use pyo3::types::PyDict;
 
 use crate::values::Fields;
 
-/// Fields of `palpate.InfluenceFunctions`: a column for every channel, NaN for those that are not in use.
+/// Fields of `palpate.InfluenceFunctions`, NaN for disabled channels.
 pub fn fields<'py>(
     py: Python<'py>,
     learnt: &InfluencesAtNodes,

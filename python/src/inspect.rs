@@ -1,4 +1,4 @@
-//! Descriptions of objects and files in words.
+//! Descriptions of objects and files.
 
 use palpate::estimators::description;
 use palpate::estimators::estimator;
@@ -58,7 +58,7 @@ pub fn inspect_table(source: &str, bytes: &[u8]) -> PyResult<Vec<String>> {
     table_in_words(source, bytes).map_err(|error| of_csv(&error))
 }
 
-/// Numbers learnt of a surface without a model; sizes in the units of the channels.
+/// Properties learnt without a model, in the units of the channels.
 fn of_linear(linear: &ForceLinearLocator, locator: &estimator::Locator) -> Value {
     let names = locator.layout().names();
     let size_of = |sizes: &[(usize, f64)], c: usize| sizes.iter().find(|(of, _)| *of == c).map(|(_, sd)| *sd);

@@ -1,7 +1,7 @@
-//! The Python package of palpate: the facade's types as classes, readings as arrays.
+//! Python package of palpate: types of the facade as classes, readings as arrays.
 //!
-//! Each file has one concept. What is written in Python (`python/palpate`) is what needs no speed: sections of a rig as data classes, the
-//! showing of progress, figures, the estimators of scikit-learn.
+//! Code without need of speed is in Python (`python/palpate`): sections of a rig as data classes,
+//! progress, figures, estimators of scikit-learn.
 #![forbid(unsafe_code)]
 #![expect(clippy::needless_pass_by_value, reason = "PyO3 extracts arguments by value")]
 

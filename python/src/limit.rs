@@ -1,4 +1,4 @@
-//! The limit: what physics allows on a bench.
+//! Cramér–Rao bound of a bench.
 
 use palpate::estimators::influence::Influence;
 use palpate::estimators::lightest_touch::{LightestTouch, TouchSummary};
@@ -114,19 +114,16 @@ fn complaint(error: &LimitError) -> PyErr {
     refused(format!("{error}: {help}"))
 }
 
-/// Positions that are told between two looks for Ctrl-C.
 const TOGETHER: usize = 500;
 
-/// A question for the limit.
 struct Asked {
     force_n: f64,
     force: Force,
-    /// Positions; all over the surface where none are given.
+    /// The whole surface for `None`.
     at: Option<Vec<Position>>,
     rate: FalseAlarmRate,
 }
 
-/// The limit for both kinds of knowledge of the force.
 struct Told {
     alive: usize,
     known: LimitCurve,

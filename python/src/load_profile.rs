@@ -1,4 +1,4 @@
-//! Load profiles: how force is spread over a surface, by a reading.
+//! Load profiles: distribution of the force over a surface.
 
 use numpy::ToPyArray;
 use palpate::estimators::estimator::{
@@ -101,17 +101,15 @@ pub fn simulate_loads<'py>(
     Fields::of_rows(py, &readings)
 }
 
-/// Loads of the sections of a rig.
 fn uniform_loads(text: &str, setup: &setup::Setup) -> PyResult<Vec<UniformLoad>> {
     let sections = RigSections::from_toml(text);
     let loads = sections.and_then(|sections| sections.loads(setup.surface()));
     loads.map_err(|error| of_rig(&error, "load", text))
 }
 
-/// Reason for a missing profile.
 enum Refused {
     Sensors(LoadSensorsError),
-    /// A reading, by its index, and what is wrong with it.
+    /// Index of a reading, and the error.
     Reading(usize, ReadingError),
     Cancelled(palpate::numerics::watch::Cancelled),
 }
@@ -181,7 +179,7 @@ impl Told {
     }
 }
 
-/// A place, the standard deviations of its coordinates, and the ends of their 95 % intervals.
+/// Position, standard deviations, and 95 % intervals.
 fn of_centre(centre: &CentreOfPressure, extent: Extent) -> Value {
     json!({
         "x": centre.position.x_m,
@@ -215,7 +213,7 @@ fn of_load(load: &UniformLoad, limit: Option<PatchLimit>, extent: Extent) -> Val
     })
 }
 
-/// Least standard deviations of evenly loaded patches of this number and these sizes.
+/// Least standard deviations for evenly loaded patches of this number and size.
 fn of_limit(limit: PatchLimit, extent: Extent) -> Value {
     json!({ "x": limit.sd_x_m, "y": extent.if_plane(limit.sd_y_m), "force": limit.sd_force_n })
 }

@@ -1,4 +1,4 @@
-//! Locators: what fitting gives, and how readings are located.
+//! Locators.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -440,7 +440,7 @@ impl Locator {
 }
 
 impl Locator {
-    /// Estimates of many readings, one after the other; Ctrl-C is heeded between their blocks.
+    /// Checks for Ctrl-C between blocks.
     fn locate_many(&self, py: Python<'_>, readings: &[f64], threads: NonZeroUsize) -> PyResult<Estimates> {
         let (channels, extent) = (self.channels.len(), self.setup.surface().extent());
         Estimates::filled(py, readings.len() / channels, extent, |rows| {
@@ -454,7 +454,7 @@ impl Locator {
             let locate =
                 |watch: Watch<'_>| self.inner.locate_blocks(readings, BatchOptions { threads, watch }, &take);
             let located = if readings.len() <= BLOCK * channels {
-                // Nobody waits long for one block, and a thread of its own would take longer than many of them.
+                // One block takes less time than the start of a thread.
                 py.detach(|| locate(Watch::NONE))
             } else {
                 work::run_with(py, Some(PyBool::new(py, false).as_any()), None, locate)?

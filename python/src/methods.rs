@@ -1,9 +1,8 @@
-//! Methods that setups and locators share: they call functions of the package that are written in Python.
+//! Methods of setups and locators that are written in Python.
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// The method `load_profile` of a setup or locator.
 pub fn load_profile<'py>(
     bench: &Bound<'py, PyAny>,
     readings: &Bound<'py, PyAny>,
@@ -16,7 +15,7 @@ pub fn load_profile<'py>(
     bench.py().import("palpate._load_profile")?.call_method("load_profile", (bench, readings), Some(&options))
 }
 
-/// A tracker of a locator; see `Locator.tracker`.
+/// See `Locator.tracker`.
 pub fn tracker<'py>(
     locator: &Bound<'py, PyAny>,
     frequency: Option<&Bound<'py, PyAny>>,

@@ -1,4 +1,4 @@
-//! Placement of sensors: which where, for the contacts that are expected.
+//! Placement of sensors for expected contacts.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -26,7 +26,6 @@ use crate::subject::Subject;
 use crate::values::Fields;
 use crate::work;
 
-/// More sensors than a curve over their number is computed for.
 const MOST_COUNT: usize = 200;
 
 /// Fields of `palpate.SensorPlacement`.
@@ -96,7 +95,6 @@ pub fn place_sensors<'py>(
     found.map_err(|error| of_work(&*error))?.fields(py, &asked)
 }
 
-/// The method of a name.
 fn named(name: &str) -> PyResult<Method> {
     serde_json::from_value(Value::from(name)).map_err(|_| {
         let known = [
@@ -130,7 +128,7 @@ struct Found {
     contacts: Vec<Position>,
     weights: Vec<f64>,
     designed: Vec<Designed>,
-    /// Whether each sensor of a layout is one of today's that is kept.
+    /// True for kept sensors, by layout.
     kept: Vec<Vec<bool>>,
     verified: Vec<(Method, Verification)>,
     counts: Vec<CountPoint>,
@@ -222,7 +220,6 @@ impl Found {
     }
 }
 
-/// Figures of merit as columns.
 fn assessments<'a>(
     fields: &Fields<'_>,
     prefix: &str,

@@ -1,4 +1,4 @@
-//! Placement of training positions, and the next press of a recording begun.
+//! Placement of training positions, and the next press of a recording.
 
 use std::sync::Arc;
 

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 
 use crate::errors::refused;
 
-/// The SI value of a number or a text with a unit, finite.
+/// Converts a finite number or a text with a unit.
 fn si(value: &Bound<'_, PyAny>, name: &str, dimension: Dimension) -> PyResult<f64> {
     let number = if let Ok(text) = value.extract::<std::borrow::Cow<'_, str>>() {
         Quantity::parse_as(&text, dimension).map_err(|error| refused(format!("`{name}`: {error}")))?
@@ -27,27 +27,23 @@ fn si(value: &Bound<'_, PyAny>, name: &str, dimension: Dimension) -> PyResult<f6
     }
 }
 
-/// A length in metres.
 pub fn length_m(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
     si(value, name, Dimension::Length)
 }
 
-/// A force in newtons.
 pub fn force_n(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
     si(value, name, Dimension::Force)
 }
 
-/// A frequency in hertz.
 pub fn frequency_hz(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
     si(value, name, Dimension::Frequency)
 }
 
-/// A time in seconds.
 pub fn time_s(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
     si(value, name, Dimension::Time)
 }
 
-/// The most memory that work may need: a number of bytes, or a text such as "2 GB".
+/// A number of bytes, or a text such as "2 GB".
 pub fn memory_limit(value: &Bound<'_, PyAny>) -> PyResult<MemoryLimit> {
     let limit = match value.extract::<std::borrow::Cow<'_, str>>() {
         Ok(text) => text.parse(),
@@ -63,7 +59,7 @@ pub fn memory_limit(value: &Bound<'_, PyAny>) -> PyResult<MemoryLimit> {
     limit.map_err(|error| refused(format!("`memory_limit`: {error}")))
 }
 
-/// A share: 0.05, or "5 %".
+/// 0.05, or "5 %".
 pub fn share(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
     si(value, name, Dimension::Ratio)
 }

@@ -1,4 +1,4 @@
-//! Rigs: one TOML file that describes the bench.
+//! Rigs: a TOML file that describes the bench.
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Sections of a rig that are kept apart: a setup's, an estimator's.
+//! Sections of a rig.
 
 use palpate::design::sensors::SensorDesign;
 use palpate::estimators::estimator::Estimator;
@@ -8,30 +8,18 @@ use pyo3::prelude::*;
 
 use crate::errors::{of_rig, refused};
 
-/// The setup of a rig's sections.
-///
-/// # Errors
-/// `FileError`, with the place.
 pub fn setup(text: &str) -> PyResult<Setup> {
     let sections = RigSections::from_toml(text);
     let setup = sections.and_then(|sections| sections.setup());
     setup.map_err(|error| of_rig(&error, "setup", text))
 }
 
-/// A setup with the imperfections that a section gives.
-///
-/// # Errors
-/// `FileError`, with the place.
 pub fn with_imperfections(text: &str, setup: &Setup) -> PyResult<Setup> {
     let sections = RigSections::from_toml(text);
     let setup = sections.and_then(|sections| sections.with_imperfections(setup.clone()));
     setup.map_err(|error| of_rig(&error, "imperfections", text))
 }
 
-/// The estimator of a section, for a setup.
-///
-/// # Errors
-/// `FileError`, with the place.
 pub fn estimator(text: &str, setup: &Setup) -> PyResult<Estimator> {
     let sections = RigSections::from_toml(text);
     let estimator = sections.and_then(|sections| sections.estimator(setup));
@@ -39,10 +27,6 @@ pub fn estimator(text: &str, setup: &Setup) -> PyResult<Estimator> {
     estimator.ok_or_else(|| refused("the text has no section [estimator]"))
 }
 
-/// The sensor design of a section, for a setup.
-///
-/// # Errors
-/// `FileError`, with the place.
 pub fn design(text: &str, setup: &Setup) -> PyResult<Option<SensorDesign>> {
     let sections = RigSections::from_toml(text);
     let design = sections.and_then(|sections| sections.design(setup));

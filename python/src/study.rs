@@ -1,4 +1,4 @@
-//! Studies: arms by seeds, fitted by the threads of this process, or task by task wherever an executor runs them.
+//! Studies: arms by seeds, fitted by threads or, task by task, by an executor.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -17,9 +17,9 @@ use crate::errors::{of_rig, of_work, refused};
 use crate::values::Fields;
 use crate::work;
 
-/// The texts of `networks.csv` and `evaluations.csv`, or rows of them.
+/// `networks.csv` and `evaluations.csv`, or rows of them.
 type Texts = (String, String);
-/// An arm by its name, the first of its seeds, and the one after the last.
+/// Arm, first seed, and the seed after the last.
 type Block = (String, u64, u64);
 
 /// A study that is ready to be run: its layouts found, its recordings made. `palpate.Study` keeps it.
@@ -111,7 +111,7 @@ impl PreparedStudy {
                 if let Err(error) = told {
                     lock(failed).get_or_insert(error);
                 }
-                // Whoever stops the work is asked again by the fits themselves.
+                // The fits check for a stop themselves.
                 let _ = watch.counted("fits", "fits", done.fetch_add(1, Ordering::Relaxed) + 1, of);
             };
             self.inner.fit_tasks(&tasks, &[], threads, &on_trained, Watch::new(&go_on))
@@ -191,7 +191,7 @@ impl PreparedStudy {
     }
 }
 
-/// A row for each arm: medians with the 5th and 95th percentiles over the seeds, and figures of its own.
+/// Medians with the 5th and 95th percentiles over the seeds, by arm.
 fn figures(fields: &Fields<'_>, arms: &[ArmResults]) -> PyResult<()> {
     fields.set("names", arms.iter().map(|arm| arm.name.as_str()).collect::<Vec<_>>())?;
     fields.column("converged", arms.iter().map(|arm| arm.converged.map(|count| count as f64)))?;
@@ -211,7 +211,7 @@ fn figures(fields: &Fields<'_>, arms: &[ArmResults]) -> PyResult<()> {
     spread("coverage_percent", |arm| arm.coverage_percent)
 }
 
-/// Of each arm the positions along the surface, in metres, and the errors there, in metres: median, 5th and 95th percentile over the seeds.
+/// Positions and errors in metres: median, 5th and 95th percentile over the seeds.
 fn by_position<'py>(py: Python<'py>, outcomes: &[ArmOutcome]) -> PyResult<Bound<'py, PyList>> {
     let arms = outcomes.iter().map(|outcome| {
         let errors = outcome.by_position(|located| located.error_m());

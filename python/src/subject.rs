@@ -1,4 +1,4 @@
-//! Subjects of a question: a setup, a rig, or a locator, each of which knows its surface and its sensors.
+//! Argument that is a setup, a rig or a locator.
 
 use std::sync::Arc;
 
@@ -13,7 +13,6 @@ use crate::bench::Setup;
 use crate::locator::Locator;
 use crate::rig::Rig;
 
-/// A setup, a rig or a locator.
 pub enum Subject<'a> {
     Setup(&'a Arc<setup::Setup>),
     Rig(&'a rig::Rig),
@@ -21,10 +20,10 @@ pub enum Subject<'a> {
 }
 
 impl<'a> Subject<'a> {
-    /// What `value` is; `name` is that of the argument.
+    /// Converts the argument `name`.
     ///
     /// # Errors
-    /// `TypeError` for something else.
+    /// `TypeError` for another type.
     pub fn of(value: &'a Bound<'_, PyAny>, name: &str) -> PyResult<Self> {
         if let Ok(setup) = value.cast::<Setup>() {
             return Ok(Self::Setup(&setup.get().0));
@@ -49,7 +48,6 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// Share of untouched readings that may be mistaken for a contact, by its settings.
     pub fn false_alarm_rate(&self) -> FalseAlarmRate {
         let set = match self {
             Self::Setup(_) => None,

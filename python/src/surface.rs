@@ -1,4 +1,4 @@
-//! Surfaces as they are drawn: their supports, and their shape under a contact.
+//! Drawing of surfaces: supports, and shape under a contact.
 
 use palpate::mechanics::contact::{Contact, OffSurface, Position};
 use palpate::mechanics::sensing::SensorKind;
@@ -8,10 +8,10 @@ use pyo3::prelude::*;
 
 use crate::errors::refused;
 
-/// Points of the line that a contact bends, its ends included: position along it and height, in metres.
+/// Positions and heights of a bent line, in metres, with both ends.
 ///
 /// # Errors
-/// `PalpateError` on a plane, on a surface without a model, and for a contact off the surface.
+/// `PalpateError` on a plane, without a model, and for a contact off the surface.
 pub fn bent_line(surface: &SurfaceSpec, contact: Contact, points: usize) -> PyResult<Vec<[f64; 2]>> {
     let model = surface.model().ok_or_else(|| refused("a measured surface has no model"))?;
     if let Extent::Plane { .. } = model.extent() {
@@ -31,7 +31,7 @@ pub fn bent_line(surface: &SurfaceSpec, contact: Contact, points: usize) -> PyRe
     Ok(along_m.map(|at_m| [at_m, contact.force_n * bent.at(Position::along(at_m))]).collect())
 }
 
-/// Kinds of the supports that take up force, in the order of [`Surface::force_supports`].
+/// In the order of [`Surface::force_supports`].
 pub fn support_kinds(surface: &SurfaceSpec) -> Vec<&'static str> {
     match surface {
         SurfaceSpec::Beam(beam) => beam.force_supports().iter().map(|_| "simple").collect(),
@@ -56,7 +56,7 @@ pub fn support_kinds(surface: &SurfaceSpec) -> Vec<&'static str> {
     }
 }
 
-/// Each edge of a plate with its support; `None` of another surface.
+/// Edges of a plate with their supports.
 pub fn edges(surface: &SurfaceSpec) -> Option<[(&'static str, &'static str); 4]> {
     let SurfaceSpec::Plate(plate) = surface else { return None };
     let edges = plate.spec().edges;

@@ -1,4 +1,4 @@
-//! Tare: readings of a surface whose offsets have moved since its calibration, brought to what calibration learnt.
+//! Tare: correction of readings for offsets that have changed since the calibration.
 
 use numpy::{PyArray1, PyArrayMethods};
 use palpate::estimators::estimator::{Locator, Tare, TareError};
@@ -10,10 +10,8 @@ use crate::arrays::{self, Readings};
 use crate::errors::refused;
 use crate::work;
 
-/// Readings between two looks for Ctrl-C.
 const READINGS_EACH: usize = 256;
 
-/// The cause for which readings were not tared.
 #[derive(Debug, thiserror::Error)]
 enum Stopped {
     #[error("{0}")]
@@ -22,10 +20,10 @@ enum Stopped {
     Cancelled(#[from] Cancelled),
 }
 
-/// Readings less what the channels read untouched today, as `untouched` says, and what calibration learnt that they do added.
+/// Subtracts the baseline of `untouched`, and adds that of the calibration.
 ///
 /// # Errors
-/// `PalpateError` for a locator that has not learnt what the surface reads untouched, and for readings of other channels.
+/// `PalpateError` without a learnt baseline, and for other channels.
 pub fn tare<'py>(
     locator: &Locator,
     channels: &[String],
@@ -60,7 +58,7 @@ pub fn tare<'py>(
         Ok(())
     };
     if rows.is_none_or(|rows| rows <= READINGS_EACH) {
-        // A thread of its own would take longer.
+        // The start of a thread would take longer.
         py.detach(|| taring(Watch::NONE)).map_err(refused)?;
     } else {
         work::run_quietly(py, taring)?;
@@ -72,11 +70,11 @@ pub fn tare<'py>(
     })
 }
 
-/// A recording with its readings tared: by those that are found untouched ("auto"), by the latest of them ("last"), by so many of the first rows, which are left out, or by
-/// untouched readings.
+/// Tares by detected untouched readings ("auto"), by the latest one ("last"), by a number of first
+/// rows, which are omitted, or by given readings.
 ///
 /// # Errors
-/// `PalpateError` as of [`tare`], and for fewer rows than are to be the untouched ones.
+/// As for [`tare`], and for too few rows.
 pub fn tared_recording(
     locator: &Locator,
     channels: &[String],
@@ -139,14 +137,13 @@ pub fn tared_recording(
     Ok(tared.subset(&(first..recording.rows.len()).collect::<Vec<_>>()))
 }
 
-/// The tare by what calibration learnt that the channels read untouched.
 fn of_calibration(locator: &Locator) -> PyResult<Tare<Vec<f64>>> {
     locator.tare().map_err(|error| {
         refused(format!("{error}: add rows of force 0 to the recording and fit again, or fit `Influence` to a recording with forces"))
     })
 }
 
-/// Refuses a locator that cannot distinguish untouched readings from contacts.
+/// Refuses a locator that does not detect contacts.
 fn check_tells_untouched(locator: &Locator, remedy: &str) -> PyResult<()> {
     match locator.false_alarm_rate() {
         Some(_) => Ok(()),
@@ -157,7 +154,7 @@ fn check_tells_untouched(locator: &Locator, remedy: &str) -> PyResult<()> {
     }
 }
 
-/// The mean of untouched readings is the baseline.
+/// The baseline is the mean of the readings.
 fn add_untouched(
     tare: &mut Tare<Vec<f64>>,
     untouched: &Bound<'_, PyAny>,

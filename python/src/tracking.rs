@@ -1,4 +1,4 @@
-//! Moving contacts: simulated, and followed through readings in time.
+//! Moving contacts: simulation and tracking.
 
 use std::sync::Arc;
 
@@ -98,7 +98,6 @@ pub fn moving_csv<'py>(
     Ok(PyBytes::new(py, &csv))
 }
 
-/// Second contacts along a line, from their positions and forces.
 fn second_contacts(second: Option<&(Vec<f64>, Vec<f64>)>) -> Vec<Contact> {
     second.map_or_else(Vec::new, |(x_m, force_n)| {
         let each = x_m.iter().zip(force_n);
@@ -106,7 +105,7 @@ fn second_contacts(second: Option<&(Vec<f64>, Vec<f64>)>) -> Vec<Contact> {
     })
 }
 
-/// A figure of the second contacts; None where there is one contact.
+/// `None` for one contact.
 fn second_column<'py>(
     py: Python<'py>,
     second: &[Contact],
@@ -116,7 +115,6 @@ fn second_column<'py>(
     (!values.is_empty()).then(|| Fields::of_numbers(py, &values))
 }
 
-/// The contacts that a section [motion] moves over a setup.
 fn moving_contacts(
     motion: &str,
     density: Option<&str>,
@@ -124,7 +122,7 @@ fn moving_contacts(
 ) -> PyResult<Option<MovingContacts>> {
     let text = match (setup.surface(), density) {
         (SurfaceSpec::Beam(beam), Some(density)) => {
-            // A beam's density, by which it swings, is a key of its surface.
+            // A beam's density, which determines the vibration, is a key of its surface.
             format!(
                 "{motion}[surface]\nkind = \"beam\"\nlength = \"{} m\"\nwidth = \"{} m\"\nthickness = \"{} m\"\nyoungs_modulus = \"{} Pa\"\ndensity = {density}\n",
                 beam.length_m(),
@@ -213,7 +211,7 @@ pub fn track<'py>(
     Ok(fields.into_dict())
 }
 
-/// Configuration of a tracker, of a surface in balance where no frequency is given.
+/// Without a frequency the surface is in static equilibrium.
 fn tracker_config(frequency: Option<Bound<'_, PyAny>>, damping: Option<f64>) -> PyResult<TrackerConfig> {
     let Some(frequency) = frequency else {
         return match damping {
@@ -346,20 +344,17 @@ fn contact_state<'py>(py: Python<'py>, contact: &Tracked) -> PyResult<Bound<'py,
     Ok(fields.into_dict())
 }
 
-/// True contacts of the rows with a known force.
 fn truths(recording: &recording::Recording, second: Option<&(Vec<f64>, Vec<f64>)>) -> Vec<Vec<Contact>> {
     let second = second_contacts(second);
     TimedRecording { recording: recording.clone(), times_s: Vec::new(), second }.truths()
 }
 
-/// The cause that ends a track before its last reading.
 enum Stopped {
-    /// A reading, by its index, that cannot be followed.
+    /// Index of a reading, and the error.
     At(usize, Box<dyn std::error::Error + Send + Sync>),
     Cancelled(Cancelled),
 }
 
-/// Takes the readings one by one; what each gives.
 fn follow(
     times_s: &[f64],
     readings: &[f64],
@@ -406,7 +401,6 @@ fn track_fields<'py>(
     Ok(fields)
 }
 
-/// Columns of the contact that is `at` this place of each track's list.
 fn contact_fields(fields: &Fields<'_>, tracks: &[Track], at: usize, plane: bool) -> PyResult<()> {
     let contacts = || tracks.iter().map(move |track| track.contacts.get(at));
     let column = |name: &str, of: fn(&Tracked) -> Option<f64>| {

@@ -1,4 +1,4 @@
-//! Training positions: the rule that places them, and how each is pressed.
+//! Training positions: arrangement and presses.
 
 use palpate::estimators::arrangement::{self, Arrangement};
 use palpate::mechanics::contact::Position;
@@ -144,7 +144,7 @@ impl Training {
     }
 }
 
-/// A placement in metres, finite and greater than 0.
+/// In metres, finite and greater than 0.
 fn checked_placement(placement: &Bound<'_, PyAny>) -> PyResult<f64> {
     let sd_m = length_m(placement, "placement")?;
     if sd_m.is_finite() && sd_m > 0.0 {
@@ -154,7 +154,7 @@ fn checked_placement(placement: &Bound<'_, PyAny>) -> PyResult<f64> {
     }
 }
 
-/// A force of presses in newtons, greater than 0.
+/// In newtons, greater than 0.
 pub fn checked_force(force: &Bound<'_, PyAny>) -> PyResult<f64> {
     let force_n = force_n(force, "force")?;
     if force_n > 0.0 {
@@ -164,12 +164,12 @@ pub fn checked_force(force: &Bound<'_, PyAny>) -> PyResult<f64> {
     }
 }
 
-/// Positions, one after the other: a list of them, or an array of the shape (positions) or (positions, 2).
+/// A list, or an array of the shape (positions) or (positions, 2).
 pub fn positions(value: &Bound<'_, PyAny>) -> PyResult<Vec<Position>> {
     value.try_iter()?.map(|at| position(&at?)).collect()
 }
 
-/// A position: a length on a line, two on a plane.
+/// A length on a line, two on a plane.
 pub fn position(value: &Bound<'_, PyAny>) -> PyResult<Position> {
     if let (false, Ok(coordinates)) = (value.is_instance_of::<PyString>(), value.try_iter()) {
         let coordinates: Vec<_> = coordinates.collect::<PyResult<_>>()?;

@@ -1,4 +1,4 @@
-//! Results as Python's own values: columns of numbers, and small tables of names.
+//! Results as values of Python: columns of numbers, and small tables of names.
 
 use numpy::{PyArray1, PyArrayMethods, ToPyArray};
 use palpate::mechanics::contact::Position;
@@ -9,7 +9,6 @@ use serde_json::Value;
 
 use crate::errors::refused;
 
-/// Fields of a result, by name.
 pub struct Fields<'py>(Bound<'py, PyDict>);
 
 impl<'py> Fields<'py> {
@@ -17,29 +16,27 @@ impl<'py> Fields<'py> {
         Self(PyDict::new(py))
     }
 
-    /// Numbers as an array.
     pub fn of_numbers(py: Python<'py>, values: &[f64]) -> Bound<'py, PyArray1<f64>> {
         values.to_pyarray(py)
     }
 
-    /// Rows of numbers as an array of the shape (rows, columns); at least one row.
+    /// Shape (rows, columns), at least one row.
     pub fn of_rows(py: Python<'py>, rows: &[Vec<f64>]) -> PyResult<Bound<'py, PyAny>> {
         let columns = rows.first().map_or(0, Vec::len);
         Ok(PyArray1::from_vec(py, rows.concat()).reshape([rows.len(), columns])?.into_any())
     }
 
-    /// Adds a field.
     pub fn set(&self, name: &str, value: impl IntoPyObject<'py>) -> PyResult<()> {
         self.0.set_item(name, value)
     }
 
-    /// Adds numbers, an element a row; NaN where there is none.
+    /// NaN for `None`.
     pub fn column(&self, name: &str, values: impl IntoIterator<Item = Option<f64>>) -> PyResult<()> {
         let values: Vec<f64> = values.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect();
         self.set(name, values.to_pyarray(self.0.py()))
     }
 
-    /// Adds numbers of the shape (rows, `N`).
+    /// Shape (rows, `N`).
     pub fn columns<const N: usize>(
         &self,
         name: &str,
@@ -48,7 +45,7 @@ impl<'py> Fields<'py> {
         self.array(name, rows, [N])
     }
 
-    /// Adds numbers of the shape (rows, 2, 2).
+    /// Shape (rows, 2, 2).
     pub fn matrices(&self, name: &str, rows: impl IntoIterator<Item = [f64; 4]>) -> PyResult<()> {
         self.array(name, rows, [2, 2])
     }
@@ -64,7 +61,7 @@ impl<'py> Fields<'py> {
         self.set(name, PyArray1::from_vec(self.0.py(), rows.into_flattened()).reshape(shape)?)
     }
 
-    /// Adds positions in metres, along and across: `y` is None on a line.
+    /// In metres; `y` is None on a line.
     pub fn positions(&self, positions: &[Position], extent: Extent) -> PyResult<()> {
         self.column("x", positions.iter().map(|position| Some(position.x_m)))?;
         match extent {
@@ -73,7 +70,7 @@ impl<'py> Fields<'py> {
         }
     }
 
-    /// Adds names and numbers within each other: a dict, or a list of them. What is not a number is None.
+    /// Null is None.
     pub fn json(&self, name: &str, value: &Value) -> PyResult<()> {
         self.set(name, json(self.0.py(), value)?)
     }
@@ -83,13 +80,13 @@ impl<'py> Fields<'py> {
     }
 }
 
-/// Names and numbers within each other as dicts and lists.
+/// Nested dicts and lists.
 pub fn json<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
     let text = serde_json::to_string(value).map_err(refused)?;
     py.import("json")?.call_method1("loads", (text,))
 }
 
-/// A position as a place of a surface: a length on a line, two of them on a plane.
+/// A length on a line, two on a plane.
 pub fn place(position: Position, extent: Extent) -> Value {
     match extent {
         Extent::Line { .. } => Value::from(position.x_m),

@@ -1,4 +1,4 @@
-//! Long work: without the interpreter's lock, watched by Ctrl-C and by whatever shows progress.
+//! Long work without the interpreter's lock, with Ctrl-C and progress.
 
 use std::error::Error;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,27 +12,24 @@ use pyo3::types::PyBool;
 
 use crate::errors::of_work;
 
-/// Time between two looks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(20);
-/// Time after which progress is shown; shorter work shows none.
 const SHOW_AFTER: Duration = Duration::from_millis(500);
-/// Time between two shows of progress.
 const SHOW_EVERY: Duration = Duration::from_millis(200);
-/// Stack of the thread that works, that of a main thread.
+/// As of a main thread.
 const STACK_BYTES: usize = 8 << 20;
 
-/// Latest progress of the work.
 #[derive(Clone)]
 struct Latest {
     rounds: u64,
     stage: Option<(&'static str, f64, Option<f64>)>,
 }
 
-/// Does work in a thread of its own while this one looks for Ctrl-C and shows the progress; `rounds` is the most that are reported, where
-/// that is known.
+/// Works in a thread while this one checks for Ctrl-C and shows progress, of at most `rounds`
+/// rounds.
 ///
 /// # Errors
-/// Those of the work, `KeyboardInterrupt`, and what a function for progress raises; the work is stopped before either is returned.
+/// Errors of the work, `KeyboardInterrupt`, and exceptions of a progress function; the work is
+/// stopped first.
 pub fn run<T, E>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
@@ -46,7 +43,7 @@ where
     run_with(py, progress, rounds, work)?.map_err(|error| of_work(&error))
 }
 
-/// Like it, without a show of progress, for work that is mostly short.
+/// [`run`] without progress, for short work.
 pub fn run_quietly<T, E>(py: Python<'_>, work: impl FnOnce(Watch<'_>) -> Result<T, E> + Send) -> PyResult<T>
 where
     T: Send,
@@ -55,12 +52,12 @@ where
     run_quietly_with(py, work)?.map_err(|error| of_work(&error))
 }
 
-/// As [`run_quietly`], with the error of the work as it is.
+/// [`run_quietly`] with an unconverted error.
 pub fn run_quietly_with<T: Send>(py: Python<'_>, work: impl FnOnce(Watch<'_>) -> T + Send) -> PyResult<T> {
     run_with(py, Some(PyBool::new(py, false).as_any()), None, work)
 }
 
-/// As [`run`], with the error of the work as it is.
+/// [`run`] with an unconverted error.
 pub fn run_with<T: Send>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
@@ -86,7 +83,7 @@ pub fn run_with<T: Send>(
         let (done, mut finished) = mpsc::channel::<()>();
         let observe = &observe;
         let working = thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, move || {
-            // Dropped at the end of the work, also of one that panics.
+            // Dropped at the end of the work, also after a panic.
             let _done = done;
             work(Watch::new(observe))
         })?;
@@ -110,18 +107,17 @@ pub fn run_with<T: Send>(
     })
 }
 
-/// Waits for the work a little, and returns whether it has ended: then the channel is closed.
+/// Waits briefly; returns true once the work has ended and closed the channel.
 fn wait(finished: &mpsc::Receiver<()>) -> bool {
     finished.recv_timeout(LOOK) == Err(mpsc::RecvTimeoutError::Disconnected)
 }
 
-/// Progress as it is shown.
 struct Shown<'py> {
     wanted: Option<Bound<'py, PyAny>>,
     rounds: Option<u64>,
     begun: Instant,
     next: Duration,
-    /// What shows it, once the work has lasted a while; `None` of it where nobody sees it.
+    /// Display, set after a while; `Some(None)` without one.
     by: Option<Option<Bound<'py, PyAny>>>,
 }
 

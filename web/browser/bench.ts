@@ -1,4 +1,4 @@
-// A simulated board whose finger a test moves, by the machine that stands beside it.
+// A simulated board with a finger that a test moves.
 
 import type { ChildProcess } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
@@ -23,7 +23,7 @@ export class Bench {
     readonly from: string,
   ) {}
 
-  /** A board on the bench of a rig of the examples, of which parts are replaced, with these further options. */
+  /** Starts a board on the bench of an example rig, with replaced parts and further options. */
   static async start(example: string, replaced: [string, string][], options: string[] = []): Promise<Bench> {
     const folder = written(example, replaced, STAGE);
     const [board, stage] = [await freePort(), await freePort()];
@@ -38,12 +38,10 @@ export class Bench {
     return join(this.folder, name);
   }
 
-  /** Presses at a place with the rig's force. */
   press(x_mm: number): void {
     this.machine.write(`G1 Z15\nG1 X${x_mm} Y0\nG1 Z9\n`);
   }
 
-  /** Presses at a place after so many quick taps. */
   tap(x_mm: number, taps: number): void {
     this.machine.write(`G1 Z15\nG1 X${x_mm} Y0\n${"G1 Z9\nG1 Z15\n".repeat(taps)}G1 Z9\n`);
   }
@@ -58,10 +56,10 @@ export class Bench {
   }
 }
 
-/** Factor by which the clocks of a machine's bench and its server run fast. */
+/** Factor by which the clocks of a machine's bench and server run fast. */
 export const CLOCK_SPEED = ["--clock-speed", "4"];
 
-/** A board, a load cell and a machine that the server alone moves. */
+/** A board, a load cell and a machine that only the server moves. */
 export class MachineBench {
   private constructor(
     private machine_port: number,
@@ -70,7 +68,7 @@ export class MachineBench {
     public stage: string,
   ) {}
 
-  /** A bench of a rig of the examples, of which parts are replaced. */
+  /** Starts the bench of an example rig, with replaced parts. */
   static async start(example: string, replaced: [string, string][]): Promise<MachineBench> {
     const folder = written(example, replaced, "");
     const [board, stage] = [await freePort(), await freePort()];
@@ -84,7 +82,7 @@ export class MachineBench {
     return join(this.folder, name);
   }
 
-  /** Presses 1 N at a place of the strip, once the server has let the machine go. */
+  /** Presses 1 N at a place of the strip, once the server has released the machine. */
   async press(x_mm: number): Promise<void> {
     const machine = await connected(this.machine_port);
     leave(() => machine.destroy());
@@ -92,7 +90,6 @@ export class MachineBench {
   }
 }
 
-/** A folder with a rig of the examples, of which parts are replaced and to which some is added; it goes with the tests. */
 function written(example: string, replaced: [string, string][], added: string): string {
   const folder = mkdtempSync(join(tmpdir(), "palpate-bench-"));
   leave(() => rmSync(folder, { recursive: true, force: true }));

@@ -1,4 +1,4 @@
-// A board without a rig: seen in the browser, given a rig there, and calibrated.
+// A board without a rig: displayed, given a rig, and calibrated in the browser.
 
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createServer, type AddressInfo, type Server as Board } from "node:net";
@@ -10,7 +10,7 @@ import { leave } from "./children";
 import { hasChromium, launch, open, picture, says } from "./chromium";
 import { Server } from "./server";
 
-/** A name that no column was made for. */
+/** A name that is too long for a column. */
 const LONG = "strain_gauge_under_the_left_support_of_the_second_beam_channel_A";
 
 /** A board that sends a line of named values 50 times a second. */
@@ -45,7 +45,7 @@ describe.skipIf(!hasChromium())("a board without a rig", () => {
       const { page, faults } = await open(browser, server.url, options);
       await says(page, "connection", /^No rig yet$/);
       await says(page, "bring-up-rate", /^\d\d Hz$/);
-      // A long name takes two lines, and leaves the value where it is seen.
+      // A long name takes two lines, and leaves the value visible.
       const now = page.locator("#bring-up-channels td").first();
       expect(await now.textContent()).toMatch(/^−8,388,\d{3}$/);
       const box = (await now.boundingBox())!;
@@ -54,7 +54,7 @@ describe.skipIf(!hasChromium())("a board without a rig", () => {
       expect(await page.locator("#bring-up-lines li").last().textContent()).toContain(`{"${LONG}":-8388`);
       expect(await page.locator(".numbers").isVisible()).toBe(false);
       expect(await page.locator("#surface").isVisible()).toBe(false);
-      // The name of a channel can be read beside the place of its sensor.
+      // The name of a channel is legible beside the place of the sensor.
       const field = (await page.locator("#rig-channel-1").boundingBox())!;
       const place = (await page.locator("#rig-sensor-place-1").boundingBox())!;
       expect(field.width).toBeGreaterThan(100);
@@ -64,14 +64,14 @@ describe.skipIf(!hasChromium())("a board without a rig", () => {
       if (name === "phone") await page.context().close();
     }
     const page = browser.contexts()[0]!.pages()[0]!;
-    // What the board sends is text, whatever it is.
+    // Any text of the board is shown as text.
     say(() => '<img src=x onerror="document.title=1">');
     await says(page, "bring-up-lines", /<img src=x onerror/);
     await says(page, "bring-up-problem", /lines arrive without values/);
     say(() => `{"${LONG}":1,"b":12}`);
     await page.locator("#bring-up-problem").waitFor({ state: "hidden" });
 
-    // What is wrong stands beside the field, whether the page or the server finds it.
+    // Problems are beside their fields, from the page and from the server.
     await page.locator("#rig-length").fill("-300");
     await page.locator("#rig-places").focus();
     await says(page, "rig-length-problem", /^This must be greater than 0\.$/);
@@ -99,7 +99,7 @@ describe.skipIf(!hasChromium())("a board without a rig", () => {
     await page.locator("#rig-places").fill("6");
     await says(page, "rig-overwrite-words", /^Replace rig\.toml, which is there already$/);
     await page.locator("#rig-make").click();
-    // Without a word nothing is replaced.
+    // An existing file is not replaced without consent.
     expect(readFileSync(join(folder, "rig.toml"), "utf8")).toBe("mine");
     await page.locator("#rig-overwrite").check();
     await page.locator("#rig-make").click();

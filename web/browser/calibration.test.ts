@@ -1,4 +1,5 @@
-// A calibration in the browser, from a rig without a locator to a live dot, on the real server; a machine plays the person's hand.
+// A calibration in the browser on the real server, from a rig without a locator to a live dot; a machine
+// presses in place of a person.
 
 import { existsSync, readFileSync } from "node:fs";
 import type { Browser, Page } from "playwright-core";
@@ -12,12 +13,11 @@ const SIX_TWICE: [string, string][] = [
   ["count = 10\nrepeats = 10", "count = 6\nrepeats = 2"],
 ];
 
-/** The instruction on the page. */
 async function step(page: Page): Promise<string> {
   return (await page.locator("#calibration-step").textContent()) ?? "";
 }
 
-/** Does what the page asks for until `until` holds. */
+/** Follows the instructions of the page until `until` returns true. */
 async function obey(
   page: Page,
   bench: Bench,
@@ -46,7 +46,6 @@ function presses(bench: Bench): number {
   return lines.filter((line) => /^[\d.]+,/.test(line) && Number(line.split(",")[2]) > 0).length;
 }
 
-/** Presses somewhere, and waits for a dot there. */
 async function dotUnder(page: Page, bench: Bench, x_mm: number): Promise<void> {
   bench.press(x_mm);
   await dotAt(page, x_mm);
@@ -96,14 +95,14 @@ describe.skipIf(!hasChromium())("calibration", () => {
     const { page, faults } = await open(browser, server.url);
     await says(page, "calibration-step", /^Ready to calibrate$/);
     expect(await page.locator("#welcome").isVisible()).toBe(false);
-    // Readings are shown before anything begins, and the placement is asked for.
+    // Readings are shown before the first press, and the page asks for the placement.
     await says(page, "calibration-rate", /^\d+ from .*Hz/);
     await page.locator("#calibration-placement").fill("1.5");
     await picture(page, "calibration-ready");
     await page.locator("#calibration-begin").click();
     await obey(page, bench, (_, taken) => taken === 3);
     await says(page, "calibration-step", /^(Let go|Press at)/);
-    // The third press is asked for again.
+    // The third press is requested again.
     await page.locator("#calibration-redo").click();
     await says(page, "calibration-progress", /^2 of 12/);
     await obey(page, bench, (asked, taken) => taken === 3 && asked.startsWith("Press at"));
@@ -112,7 +111,7 @@ describe.skipIf(!hasChromium())("calibration", () => {
     await picture(page, "calibration-light");
     await obey(page, bench, (asked) => asked === "No more presses are asked for");
     expect(presses(bench)).toBe(12);
-    // A press that is struck out is asked for again.
+    // A deleted press is requested again.
     await page.locator("#calibration-presses summary").click();
     await page.getByRole("button", { name: "Strike out press 5", exact: true }).click();
     await says(page, "calibration-progress", /^11 of 12/);
@@ -134,7 +133,7 @@ describe.skipIf(!hasChromium())("calibration", () => {
     expect(await page.locator("#calibration-checked-places tr").count()).toBe(5);
     await picture(page, "calibration-checked");
     bench.lift();
-    // The session goes on with the locator.
+    // The session continues with the locator.
     await dotUnder(page, bench, 200);
     await page.locator("#calibration-close").click();
     expect(await page.locator("#calibration").isVisible()).toBe(false);

@@ -1,10 +1,10 @@
-// Programs that a test started: all are ended and what they left is removed, whether the test passed or not.
+// Child processes and files of tests, which are ended and removed even after a failure.
 
 import { type ChildProcess, spawn, type SpawnOptions } from "node:child_process";
 
 const left = new Set<() => void>();
 
-/** Starts a program that does not outlive the tests. */
+/** Starts a program that ends with the tests. */
 export function start(program: string, args: string[], options: SpawnOptions): ChildProcess {
   const child = spawn(program, args, options);
   const end = leave(() => child.kill("SIGKILL"));
@@ -12,13 +12,12 @@ export function start(program: string, args: string[], options: SpawnOptions): C
   return child;
 }
 
-/** Notes what is to be done when the tests have ended. */
+/** Registers a cleanup for the end of the tests. */
 export function leave(end: () => void): () => void {
   left.add(end);
   return end;
 }
 
-/** Ends what was started, the last first. */
 export function endAll(): void {
   for (const end of [...left].reverse()) {
     left.delete(end);
@@ -26,5 +25,5 @@ export function endAll(): void {
   }
 }
 
-// A run that is ended before its tests are.
+// A run that is interrupted.
 process.once("exit", endAll);

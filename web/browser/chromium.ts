@@ -1,4 +1,4 @@
-// Headless Chromium, and pages that remember what went wrong on them.
+// Headless Chromium, and pages that record their faults.
 
 import { appendFileSync, existsSync, mkdirSync } from "node:fs";
 import { type Browser, type BrowserContextOptions, chromium, type Page } from "playwright-core";
@@ -15,10 +15,10 @@ const FLAGS = [
   "--disable-component-update",
   "--disable-sync",
 ];
-/** Pictures of the page, for a person to look at. */
+/** Screenshots for manual inspection. */
 const PICTURES = `${ROOT}/target/xtask/dashboard`;
 
-/** True where Chromium is; says that the tests are skipped where it is not, as the tests in Rust do. */
+/** Returns true if Chromium is installed; otherwise reports skipped tests, as the tests in Rust do. */
 export function hasChromium(): boolean {
   if (existsSync(PROGRAM)) return true;
   const line = "skipped web/browser/dashboard.test.ts: Chromium is missing; install Debian's chromium, or name the program in PALPATE_CHROMIUM";
@@ -33,7 +33,7 @@ export function launch(): Promise<Browser> {
   return chromium.launch({ executablePath: PROGRAM, args: FLAGS });
 }
 
-/** A page, and the faults that a person would not see: errors, and what was fetched from elsewhere. */
+/** Opens a page; `faults` collects errors and requests to other hosts. */
 export async function open(browser: Browser, url: string, options: BrowserContextOptions = {}): Promise<{ page: Page; faults: string[] }> {
   const context = await browser.newContext({ viewport: { width: 1280, height: 1000 }, ...options });
   const page = await context.newPage();
@@ -41,7 +41,7 @@ export async function open(browser: Browser, url: string, options: BrowserContex
   const faults: string[] = [];
   page.on("pageerror", (error) => faults.push(String(error.stack ?? error)));
   page.on("console", (message) => {
-    // A server that is away is an error of the network, which the page says in words.
+    // The page itself reports a server that does not respond.
     if (message.type() === "error" && !message.text().includes("ERR_CONNECTION")) faults.push(message.text());
   });
   page.on("request", (request) => {
@@ -58,7 +58,6 @@ export async function picture(page: Page, name: string): Promise<void> {
 /** Longest wait for a fit, in milliseconds: it is computed beside a browser on two cores. */
 export const FIT_MS = 90_000;
 
-/** Waits until an element has such a text, and gives all of it. */
 export async function says(page: Page, id: string, text: RegExp, timeout = 30_000): Promise<string> {
   await page.waitForFunction(
     ({ id, source, flags }) => new RegExp(source, flags).test(document.getElementById(id)?.textContent ?? ""),
@@ -68,7 +67,6 @@ export async function says(page: Page, id: string, text: RegExp, timeout = 30_00
   return (await page.locator(`#${id}`).textContent()) ?? "";
 }
 
-/** Waits for a dot at a place. */
 export async function dotAt(page: Page, x_mm: number): Promise<void> {
   await page.waitForFunction(
     (x_mm) => {

@@ -1,4 +1,4 @@
-// The dashboard in a browser, on the real server with its simulated board: as a person uses it, by clicks and by keys.
+// The dashboard in a browser on the real server with a simulated board, by clicks and keys.
 
 import { readFileSync } from "node:fs";
 import type { Browser, Page } from "playwright-core";
@@ -9,7 +9,6 @@ import { hasChromium, launch, open, picture, says } from "./chromium";
 import { record } from "./recorder";
 import { Server } from "./server";
 
-/** Waits until the page shows a sample. */
 async function shows(page: Page, sample: SampleRecord): Promise<void> {
   const position = isPlaced(sample.status) ? number(sample.x_mm, sample.sd_mm) : "—";
   const expected = { status: statusWords(sample).word, position };
@@ -20,7 +19,7 @@ async function shows(page: Page, sample: SampleRecord): Promise<void> {
   );
 }
 
-/** Pixels of the surface that have the colour of the contact. */
+/** Pixels of the surface with the colour of the contact. */
 function contactPixels(page: Page): Promise<number> {
   return page.evaluate(() => {
     const canvas = document.getElementById("surface") as HTMLCanvasElement;
@@ -35,7 +34,10 @@ function contactPixels(page: Page): Promise<number> {
   });
 }
 
-/** What views show in frames in which something is located: the words at the dot, the large number, the dot of the budget in mm. */
+/**
+ * Values of views in frames with a located contact: label of the dot, large number, dot of the budget
+ * in mm.
+ */
 function estimatesOfFrames(page: Page, count: number): Promise<{ drawn: string; written: string; budget: number; sd: boolean }[]> {
   return page.evaluate(async (count) => {
     const drawing = CanvasRenderingContext2D.prototype;
@@ -56,7 +58,7 @@ function estimatesOfFrames(page: Page, count: number): Promise<{ drawn: string; 
     let previous = "";
     while (seen.length < count) {
       await new Promise((resolve) => requestAnimationFrame(resolve));
-      // The page's own frame, and all it draws, has come before or comes within this task.
+      // The page's own frame and all drawings are complete before or within this task.
       await new Promise((resolve) => setTimeout(resolve));
       if (text("status") !== "Located" || label === "" || label === previous) continue;
       previous = label;
@@ -71,7 +73,7 @@ function estimatesOfFrames(page: Page, count: number): Promise<{ drawn: string; 
   }, count);
 }
 
-/** Has the page note what is written on the charts, and what of it lies beyond their edges. */
+/** Records the texts on the charts, and texts beyond the edges. */
 async function watchTexts(page: Page): Promise<void> {
   await page.evaluate(() => {
     const watched = window as unknown as { cutTexts: string[]; drawnTexts: Map<string, string[]> };
@@ -93,7 +95,6 @@ async function watchTexts(page: Page): Promise<void> {
   });
 }
 
-/** The path of a file that a button has the page download. */
 async function downloaded(page: Page, button: string): Promise<string> {
   const [download] = await Promise.all([page.waitForEvent("download"), page.locator(button).click()]);
   return download.path();
@@ -121,7 +122,7 @@ describe.skipIf(!hasChromium())("dashboard", () => {
       await says(page, "status", /^Located$/);
       expect(Number(await says(page, "position", /^\d/))).toBeGreaterThanOrEqual(0);
       expect(await says(page, "position-95", /^95 %: .+ to .+ mm$/)).toContain("mm");
-      // The disc of the contact alone has 200 pixels; the words and its trail are beside it.
+      // The disc of the contact has 200 pixels; label and trail are beside it.
       expect(await contactPixels(page)).toBeGreaterThan(150);
       await says(page, "announcer", /^(Touch-down at \d+.* mm|Lift-off after )/);
       await says(page, "budget-words", /^Limit for .* N: .* mm over the surface\./);
@@ -144,11 +145,11 @@ describe.skipIf(!hasChromium())("dashboard", () => {
       expect(seen.length).toBe(40);
       for (const { drawn, written, budget, sd } of seen) {
         expect(drawn).toBe(written);
-        // The dot of the budget stands at the contact, whose standard deviation is in the words.
+        // The dot of the budget is at the contact; the label contains the standard deviation.
         expect(Math.abs(budget - Number(written))).toBeLessThan(1);
         expect(sd).toBe(true);
       }
-      // The estimates moved meanwhile, so that views of different moments would have differed.
+      // The estimates moved meanwhile, so views of different instants would differ.
       expect(new Set(seen.map(({ drawn }) => drawn)).size).toBeGreaterThan(5);
     });
 
@@ -196,7 +197,7 @@ describe.skipIf(!hasChromium())("dashboard", () => {
       await page.locator("#alarm-text").fill("a hand is there");
       await page.getByRole("button", { name: "Add the rule" }).click();
       await says(page, "alarm-problem", /^line 3: `x` is from 0 mm to -5 mm/);
-      // The browser notes every refusal.
+      // The browser records every refusal.
       expect(faults.splice(0)).toEqual(["Failed to load resource: the server responded with a status of 400 (Bad Request)"]);
       const file = page.locator("#alarm-file");
       await file.fill((await file.inputValue()).replace("-5 mm", "400 mm"));
@@ -216,7 +217,7 @@ describe.skipIf(!hasChromium())("dashboard", () => {
       await page.locator("#alarm-set").click();
       await says(page, "alarm-done", /^No alarms are set/);
       await page.locator("#alarms-close").click();
-      // The focus goes back to the button, which the space bar would press.
+      // The focus returns to the button, which the space bar would press.
       await page.locator("#surface-title").click();
     });
 
@@ -255,7 +256,7 @@ describe.skipIf(!hasChromium())("dashboard", () => {
       });
       await page.keyboard.press("Space");
       await page.waitForTimeout(200);
-      // A touch may have begun in the meantime: then the page shows that, and this test has nothing to see.
+      // A touch may have begun in the meantime: then the page shows it, and the check is skipped.
       if ((await page.locator("#status").textContent()) === "No contact") expect(await contactPixels(page)).toBe(0);
       await page.keyboard.press("Space");
     });

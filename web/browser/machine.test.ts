@@ -1,4 +1,4 @@
-// A calibration by a machine, from the browser: the simulated machine of the simulated board, on the real server.
+// A calibration by the simulated machine of the simulated board, on the real server.
 
 import { existsSync, readFileSync } from "node:fs";
 import type { Browser, Page } from "playwright-core";
@@ -8,7 +8,6 @@ import { endAll } from "./children";
 import { FIT_MS, dotAt, hasChromium, launch, open, picture, says } from "./chromium";
 import { Server } from "./server";
 
-/** Waits until so many presses were taken. */
 async function taken(page: Page, count: number): Promise<void> {
   await page.waitForFunction((count) => (document.getElementById("calibration-bar") as HTMLProgressElement).value >= count, count, { timeout: 60_000 });
 }
@@ -93,7 +92,7 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
     await taken(first.page, 2);
     await picture(first.page, "machine-phone");
     expect(await first.page.evaluate(() => document.documentElement.scrollWidth)).toBe(390);
-    // The stop is there whatever else is open.
+    // The stop is visible over all dialogs.
     await first.page.keyboard.press("?");
     await first.page.keyboard.press("Escape");
     await says(first.page, "calibration-problem", /stopped by hand/);
@@ -102,7 +101,7 @@ describe.skipIf(!hasChromium())("calibration by a machine", () => {
     await first.page.keyboard.press("b");
     await taken(first.page, 5);
     await first.page.context().close();
-    // Without a page the finger is lifted after 5 s of the bench's clock, and nothing more is pressed.
+    // Without a page the finger is lifted after 5 s of the bench's clock, and pressing stops.
     await new Promise((resolve) => setTimeout(resolve, 6_000));
     const pressed = presses(bench);
     await new Promise((resolve) => setTimeout(resolve, 1_000));

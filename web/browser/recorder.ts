@@ -1,4 +1,5 @@
-// Recordings of a page's own stream, in the shapes of the server's answers: the page is held to them whether the server records or not.
+// Recordings of a page's own stream, in the shapes of the server's answers, for servers with and without
+// recording.
 
 import type { Page, Route } from "playwright-core";
 import type { EventRecord, RecordingContent, SampleRecord, SessionInfo, StreamMessage } from "../src/protocol";
@@ -6,7 +7,7 @@ import type { EventRecord, RecordingContent, SampleRecord, SessionInfo, StreamMe
 const NAME = "session-1.mcap";
 const FOLDER = "recordings";
 
-/** Answers the requests about recordings of a page that is loaded after this; all else goes to the server. Gives what was recorded. */
+/** Answers the recording requests of pages that are loaded later, and returns the recorded samples. */
 export async function record(page: Page, url: string): Promise<() => SampleRecord[]> {
   let on = false;
   let samples: SampleRecord[] = [];

@@ -5,11 +5,10 @@ import { createServer } from "node:net";
 import { fileURLToPath } from "node:url";
 import { start } from "./children";
 
-/** The folder that holds the workspace. */
 export const ROOT = fileURLToPath(new URL("../..", import.meta.url));
 
 export const BINARY = process.env.PALPATE_BINARY ?? `${ROOT}/target/debug/palpate`;
-/** Longest time to the first answer: a rig is fitted to its simulation first. */
+/** Longest time to the first answer, which includes a fit to simulated readings. */
 const START_MS = 40_000;
 
 export class Server {
@@ -18,7 +17,6 @@ export class Server {
     readonly url: string,
   ) {}
 
-  /** Starts a server and waits for its first answer. */
   static async start(args: string[], port?: number, folder = ROOT): Promise<Server> {
     const listen = `127.0.0.1:${port ?? (await freePort())}`;
     const child = start(BINARY, ["serve", ...args, "--listen", listen], { cwd: folder, stdio: ["ignore", "pipe", "pipe"] });
@@ -41,14 +39,13 @@ export class Server {
     return Number(new URL(this.url).port);
   }
 
-  /** Kills the server, as a power cut would. */
+  /** Kills the server, like a power cut. */
   async kill(): Promise<void> {
     const gone = new Promise((resolve) => this.child.once("exit", resolve));
     this.child.kill("SIGKILL");
     await gone;
   }
 
-  /** Ends the server, and waits until it has gone. */
   async stop(): Promise<void> {
     if (this.child.exitCode !== null || this.child.signalCode !== null) return;
     const gone = new Promise((resolve) => this.child.once("exit", resolve));

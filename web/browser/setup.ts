@@ -1,4 +1,4 @@
-// For every file of tests: no server and no board is left running, whatever failed.
+// Ends all servers and boards after every file of tests.
 
 import { afterAll } from "vitest";
 import { endAll } from "./children";

@@ -1,4 +1,4 @@
-// Requests to `palpate serve`, at the address that the page came from.
+// Requests to `palpate serve`, at the origin of the page.
 
 import type {
   AlarmFile,
@@ -15,23 +15,22 @@ import type {
   StepDetails,
 } from "./protocol";
 
-/** An answer of the server that is no success: its words, and what can be done. */
+/** An error answer of the server: message and remedy. */
 export class ApiError extends Error {
   constructor(
     readonly status: number,
     words: string,
     readonly help: string | null,
-    /** Field of a form that is to be corrected. */
+    /** Invalid field of a form. */
     readonly field: string | null = null,
   ) {
     super(help === null ? words : `${words}: ${help}`);
   }
 }
 
-/** The token of the page's own address; only servers beyond loopback have one. */
+/** Token in the page's address; only servers beyond loopback have one. */
 const token = new URLSearchParams(location.search).get("token");
 
-/** Longest time that an answer may take. */
 const TIMEOUT_MS = 10_000;
 
 async function request(path: string, init: RequestInit): Promise<Response> {

@@ -1,18 +1,16 @@
-// Small helpers for the page's elements.
+// Helpers for elements of the page.
 
-/** The element of an id, of the type that it is expected to have. */
 export function need<T extends HTMLElement = HTMLElement>(id: string): T {
   const found = document.getElementById(id);
   if (found === null) throw new Error(`the page has no element #${id}`);
   return found as T;
 }
 
-/** Writes a text where it differs from what stands there: an unchanged text costs no layout. */
+/** Writes a text if it differs: an unchanged text costs no layout. */
 export function setText(element: HTMLElement, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }
 
-/** A new element with a class and children. */
 export function element<K extends keyof HTMLElementTagNameMap>(
   tag: K,
   className: string,
@@ -24,7 +22,7 @@ export function element<K extends keyof HTMLElementTagNameMap>(
   return made;
 }
 
-/** A value of an earlier visit; null where there is none, or the browser keeps none. */
+/** Value of an earlier visit; null if there is none. */
 export function remembered(key: string): string | null {
   try {
     return localStorage.getItem(`palpate-${key}`);
@@ -37,17 +35,16 @@ export function remember(key: string, value: string): void {
   try {
     localStorage.setItem(`palpate-${key}`, value);
   } catch {
-    // A browser that keeps nothing asks again the next time.
+    // Without storage the page asks again at the next visit.
   }
 }
 
-/** Hands a file to the browser's downloads. */
 export function save(name: string, content: Blob): void {
   const url = URL.createObjectURL(content);
   const link = element("a", "");
   link.href = url;
   link.download = name;
   link.click();
-  // The browser reads it after this turn.
+  // The browser reads the URL after this turn.
   setTimeout(() => URL.revokeObjectURL(url), 10_000);
 }

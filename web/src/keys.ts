@@ -2,7 +2,6 @@
 
 import { need, remember, remembered } from "./dom";
 
-/** Starts to listen; `actions` are called by their key. */
 export function startKeys(actions: Record<string, () => void>): void {
   const on = need<HTMLInputElement>("keys-on");
   on.checked = remembered("keys") !== "off";
@@ -17,7 +16,7 @@ export function startKeys(actions: Record<string, () => void>): void {
   });
 }
 
-/** True of an element that does something of its own with a key. */
+/** Returns true for an element that uses the key itself. */
 function takesKey(target: EventTarget | null, key: string): boolean {
   if (!(target instanceof HTMLElement)) return false;
   if (target instanceof HTMLInputElement && target.type !== "range" && target.type !== "checkbox") return true;

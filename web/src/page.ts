@@ -1,4 +1,4 @@
-// The page: what the session sends and a person does, and what is shown of it.
+// The page: state of the session, actions of the user, and display.
 
 import { api, ApiError } from "./api";
 import { need, remember, remembered, save, setText } from "./dom";
@@ -29,12 +29,11 @@ import { badFrameWords, bytes, PLAIN_MARK, seconds } from "./words";
 
 /** Milliseconds between two snapshots; all views of a frame show one snapshot. */
 const SNAPSHOT_MS = 33;
-/** Milliseconds between two writings of facts that no estimate belongs to: age, rate, counts. */
+/** Milliseconds between two updates of facts without an estimate: age, rate, counts. */
 const FACTS_MS = 250;
-/** Motion for people who ask for less of it. */
+/** Milliseconds between snapshots with reduced motion. */
 const REDUCED_MS = 200;
 
-/** Views of a session; made anew for another one. */
 interface Views {
   line: LineView;
   charts: Charts;
@@ -105,8 +104,6 @@ export class Page {
     requestAnimationFrame(frame);
   }
 
-  // What the server says.
-
   connected(connection: Connection): void {
     this.connection = connection;
     if (connection === "open") {
@@ -130,7 +127,7 @@ export class Page {
     if (told.some((event) => event.event === "tared")) this.notice("Tared: the baseline was measured again.");
   }
 
-  /** Asks what session it is; new views for another one. */
+  /** Requests the session; creates new views for another one. */
   private async ask(): Promise<void> {
     try {
       const session = await api.session();
@@ -188,12 +185,11 @@ export class Page {
 
   private everySecond(): void {
     const records = this.session?.recording?.name != null;
-    // A session that is silent may have ended, or another have begun.
+    // A silent session may have ended, or another may have begun.
     if (this.connection === "open" && (records || this.silent_s() > SILENT_S)) void this.ask();
     this.writeBanner();
   }
 
-  /** Seconds since the last reading came. */
   private silent_s(): number {
     return (performance.now() - this.heard_ms) / 1000;
   }
@@ -211,7 +207,7 @@ export class Page {
   }
 
   private bannerWords(): string {
-    // Words that do not change while they hold: a screen reader says every change.
+    // Words that do not change while a state lasts: a screen reader announces every change.
     if (this.connection === "lost") return "The connection to palpate serve is lost: what is shown is not live. Trying again.";
     const expected = this.connection === "open" && this.session !== null && this.session.source !== null;
     if (!expected || this.silent_s() < SILENT_S) return "";
@@ -219,22 +215,20 @@ export class Page {
       const waits = (this.live.state?.counters.readings ?? 0) === 0;
       return waits ? "The source is not there yet; it is opened as soon as it is." : "The source is disconnected, and palpate tries to reconnect: the values shown are not live.";
     }
-    // A word for the cause that is most frequent, which does not change with every frame.
+    // A word for the most frequent cause, which does not change with every frame.
     const bad = Object.entries(this.live.state?.counters.bad_frames ?? {}).sort(([, one], [, other]) => other - one);
     const cause = bad[0]?.[0];
     if (cause === undefined) return "The source sends no readings: what is shown is not live.";
     return `The source sends frames that are not readings (${badFrameWords(cause)}): what is shown is not live.`;
   }
 
-  /** A calibration that guides has no estimates: what shows them is left out, and the next place is drawn. */
+  /** A guided calibration has no estimates: their display is hidden, and the next place is drawn. */
   private calibrationChanged(): void {
     document.body.classList.toggle("calibrating", this.calibration.guides);
     this.dirty = true;
     // The session begins as soon as there is a locator.
     if (!this.calibration.guides && this.session?.locator === null) void this.ask();
   }
-
-  // What a person does.
 
   private async act(what: () => Promise<void>, done: string): Promise<void> {
     try {
@@ -340,8 +334,6 @@ export class Page {
     this.notice(words);
   }
 
-  // What is shown.
-
   private draw(now: number, elapsed_s: number): void {
     if (this.session === null || this.views === null) return;
     const player = this.replay.player;
@@ -375,14 +367,13 @@ export class Page {
     });
   }
 
-  /** Draws every view from one snapshot. */
   private show(views: Views, shown: Snapshot, frozen: boolean): void {
     this.drawSurface(views, shown);
     writeNumbers(shown);
     this.writeSurfaceNote(views, shown);
     views.budget.draw(shown);
     views.health.writeChannels(shown);
-    // A person may have chosen a part of a chart that stands still.
+    // A user may have selected a part of a frozen chart.
     if (!frozen) views.charts.draw(shown);
   }
 

@@ -1,6 +1,6 @@
-// Records of `palpate serve`, as docs/reference/server.md and the server's own documentation have them.
+// Records of `palpate serve`, as in docs/reference/server.md and the server's own documentation.
 
-/** Position, force and their uncertainty. What was not estimated is left out. */
+/** Position, force and uncertainty, as far as they are estimated. */
 export interface ContactRecord {
   x_mm: number;
   y_mm?: number;
@@ -17,7 +17,7 @@ export interface ContactRecord {
 
 export type Status = "located" | "no_contact" | "ambiguous" | "outside_model" | "outside_surface";
 
-/** A place that explains a reading, with its share of the probability. */
+/** A candidate place with its probability. */
 export type ModeRecord = ContactRecord & { probability: number };
 
 export interface EstimateRecord extends ContactRecord {
@@ -59,7 +59,6 @@ export type EventRecord = { time_s: number } & (
   | { event: "mark"; text: string }
 );
 
-/** A message of the stream, sixty times a second. */
 export interface StreamMessage {
   state: StateRecord;
   samples: SampleRecord[];
@@ -89,7 +88,6 @@ export interface SurfaceInfo {
   supports: { at_mm: number; kind: string }[];
 }
 
-/** Cramér–Rao bound over the surface. */
 export interface LimitInfo {
   positions_mm: (number | [number, number])[];
   sd_mm: (number | null)[];
@@ -108,11 +106,11 @@ export interface SessionInfo {
   recording: RecordingState | null;
   has_simulated: boolean;
   calibrates: boolean;
-  /** True where the server has a board without a rig. */
+  /** True for a board without a rig. */
   brings_up: boolean;
 }
 
-/** Where recordings go; a name while one is being made. */
+/** Destination of recordings, and the name of a running one. */
 export interface RecordingState {
   folder: string;
   name: string | null;
@@ -123,7 +121,7 @@ export interface RecordingState {
 export interface RecordingInfo {
   name: string;
   bytes: number;
-  /** Seconds since 1970; null where nothing was recorded. */
+  /** Seconds since 1970; null for an empty recording. */
   start_s: number | null;
   seconds: number;
   readings: number;
@@ -143,7 +141,10 @@ export type CalibrationStep =
   | "begin" | "redo" | "skip" | "untouched" | "stop" | "finish" | "strike" | "check" | "dry_run" | "set_up" | "jog" | "touch_off";
 export type Axis = "x" | "y" | "z";
 
-/** What goes with a step: statements of the operator with `begin`, the number of the press with `strike`, axis and distance with `jog`. */
+/**
+ * Details of a step: statements of the operator with `begin`, number of the press with `strike`, axis
+ * and distance with `jog`.
+ */
 export interface StepDetails {
   placement_mm?: number;
   second_force_n?: number;
@@ -153,7 +154,6 @@ export interface StepDetails {
   by_mm?: number;
 }
 
-/** A place to press. */
 export interface PlaceRecord {
   x_mm: number;
   y_mm?: number;
@@ -163,7 +163,6 @@ export interface PlaceRecord {
   spread_percent: number | null;
 }
 
-/** State of a calibration. */
 export interface CalibrationRecord {
   phase: CalibrationPhase;
   waiting: Waiting;
@@ -177,9 +176,9 @@ export interface CalibrationRecord {
   reading: number[];
   bad_frames: number;
   presses: string;
-  /** Standard deviation of the pressed place about the asked one; null while nobody says it. */
+  /** Standard deviation of the pressed place about the requested one; null if it is unknown. */
   placement_mm: number | null;
-  /** The one weight of all presses, where a second one is to be asked for. */
+  /** The weight of all presses, if a second one is requested. */
   single_weight_n: number | null;
   problem: string | null;
   hint: string | null;
@@ -187,11 +186,10 @@ export interface CalibrationRecord {
   outcome: CalibrationOutcome | null;
   check: CheckRecord | null;
   can_check: boolean;
-  /** True where a machine can be set up: dry run, jogs, touch-off. */
+  /** True if a machine can be set up: dry run, jogs, touch-off. */
   can_set_up: boolean;
 }
 
-/** A press that was taken. */
 export interface PressRecord {
   press: number;
   x_mm: number;
@@ -199,11 +197,11 @@ export interface PressRecord {
   force_n: number | null;
   deviation_percent: number | null;
   held_out_mm: number | null;
-  /** Seconds before it was taken, and the distance from the untouched reading in %. */
+  /** Seconds before the press was taken, and the distance from the untouched reading in %. */
   trace: [number, number][];
 }
 
-/** A check of the locator at fresh places. */
+/** A check of the locator at new places. */
 export interface CheckRecord {
   presses: string;
   places: { x_mm: number; y_mm?: number; estimate_x_mm: number; estimate_y_mm?: number; error_mm: number; covered: boolean | null }[];
@@ -215,30 +213,28 @@ export interface CheckRecord {
 
 export type Motion = "blind" | "homing" | "travelling" | "pressing" | "lifting" | "up" | "down";
 
-/** A machine that presses. */
 export interface MachineRecord {
   url: string;
   firmware: string | null;
-  /** The way in which a stop acts, where that is not at once. */
+  /** Effect of a stop that does not act at once; null if it does. */
   stopping: string | null;
-  /** True from its greeting until its finger is lifted for good. */
+  /** True from the greeting until the final lift of the finger. */
   runs: boolean;
   motion: Motion | null;
-  /** Place on the surface that it was sent to. */
+  /** Target place on the surface. */
   x_mm: number | null;
   y_mm: number | null;
   depth_mm: number | null;
-  /** Force at the load cell. */
   force_n: number | null;
   left_s: number | null;
-  /** Position by its own axes, after its last move. */
+  /** Position in its own axes, after the last move. */
   at_mm: [number, number, number] | null;
-  /** Height of the touch that a touch-off found. */
+  /** Height of a touch-off. */
   found_touch_mm: number | null;
   moves: MovesRecord;
 }
 
-/** Where a machine moves, by its own axes, and how fast. */
+/** Range and speed of a machine's moves, in its own axes. */
 export interface MovesRecord {
   x_mm: [number, number];
   y_mm: [number, number];
@@ -251,7 +247,6 @@ export interface MovesRecord {
   force_limit_n: number | null;
 }
 
-/** Outcome of a calibration. */
 export interface CalibrationOutcome {
   locator: string;
   presses: number;
@@ -266,7 +261,7 @@ export interface CalibrationOutcome {
 /** A board without a rig. */
 export interface BringUpRecord {
   from: string;
-  /** Of serial ports. */
+  /** For serial ports. */
   port: string | null;
   baud: number | null;
   ports: { name: string; device: string | null }[];
@@ -277,12 +272,12 @@ export interface BringUpRecord {
   rate_hz: number;
   bad_frames: Record<string, number>;
   channels: { name: string; now: number | null; range: [number, number] | null }[];
-  /** True where the board names its values. */
+  /** True if the board names its values. */
   named: boolean;
   lines: { time_s: number; text: string; reads: boolean }[];
 }
 
-/** Answers of a person from which the server makes a rig. */
+/** Answers of the form from which the server makes a rig. */
 export interface RigForm {
   file: string;
   channels: string[];
@@ -290,10 +285,10 @@ export interface RigForm {
   width_mm: number | null;
   places: number[];
   repeats: number;
-  /** Force of every press; null where it is unknown. */
+  /** Force of every press; null if it is unknown. */
   force_n: number | null;
   second_force_n: number | null;
-  /** How far off the asked place a person presses, as a standard deviation. */
+  /** Standard deviation of the pressed place about the requested one. */
   placement_mm: number | null;
   /** Place of each sensor: along the length and, on a plane, across it. */
   sensor_places_mm: number[][] | null;
@@ -314,6 +309,6 @@ export interface MadeRigRecord {
 
 export interface AlarmFile {
   text: string;
-  /** File that keeps the text; null where it ends with the server. */
+  /** File of the text; null if it is lost with the server. */
   file: string | null;
 }

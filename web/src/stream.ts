@@ -1,22 +1,24 @@
-// The stream of the session, opened again whenever it is lost.
+// Stream of the session, reopened after a loss.
 
 import { api } from "./api";
 import type { StreamMessage } from "./protocol";
 
-/** State of the connection. */
 export type Connection = "connecting" | "open" | "lost";
 
 const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 5_000;
-/** A session sends sixty messages a second. Without any for so long, the server is asked whether it is there: without a source it has none. */
+/**
+ * A session sends sixty messages a second. After this silence, the page checks the server: without a
+ * source it sends none.
+ */
 const SILENCE_MS = 3_000;
 
-/** Milliseconds before an attempt, from 1: twice as long each time, up to five seconds. */
+/** Milliseconds before an attempt, from 1: doubled each time, up to five seconds. */
 export function wait_ms(attempt: number): number {
   return Math.min(FIRST_WAIT_MS * 2 ** (attempt - 1), LONGEST_WAIT_MS);
 }
 
-/** Opens the stream, and keeps it open for as long as the page lives. */
+/** Opens the stream, and keeps it open for the life of the page. */
 export function openStream(take: (message: StreamMessage) => void, tell: (connection: Connection) => void): void {
   let attempt = 0;
   const open = () => {

@@ -1,16 +1,14 @@
-// What statuses, states and events are called, and numbers with their units.
+// Names of statuses, states and events, and numbers with units.
 
 import type { ChannelState, ContactRecord, EstimateRecord, EventRecord, Status } from "./protocol";
 
-/** Text of a mark without one. */
 export const PLAIN_MARK = "mark";
 
-/** True of a status whose position means something. */
+/** Returns true for a status with a meaningful position. */
 export function isPlaced(status: Status): boolean {
   return status === "located" || status === "ambiguous";
 }
 
-/** A status in a word or two, and what it means. */
 export function statusWords(estimate: EstimateRecord): { word: string; why: string } {
   switch (estimate.status) {
     case "located": {
@@ -54,12 +52,10 @@ const BAD_FRAMES: Record<string, string> = {
   malformed: "not a frame",
 };
 
-/** Why a frame was no reading. */
 export function badFrameWords(cause: string): string {
   return BAD_FRAMES[cause] ?? cause.replaceAll("_", " ");
 }
 
-/** A position and a force in words. */
 export function contactWords(contact: ContactRecord): string {
   const place =
     contact.y_mm === undefined
@@ -68,7 +64,6 @@ export function contactWords(contact: ContactRecord): string {
   return contact.force_n === undefined ? place : `${place}, ${number(contact.force_n, contact.sd_force_n)} N`;
 }
 
-/** An event in words. */
 export function eventWords(event: EventRecord): string {
   switch (event.event) {
     case "source_opened":
@@ -106,22 +101,25 @@ export function eventWords(event: EventRecord): string {
   }
 }
 
-/** A number with as many decimals as its standard deviation lets mean something: its first digit is the last. */
+/**
+ * A number with as many decimals as the standard deviation justifies: the first digit of the latter is
+ * the last.
+ */
 export function number(value: number, sd?: number): string {
   if (!Number.isFinite(value)) return "—";
   return fixed(value, decimals(sd ?? Math.abs(value) / 100));
 }
 
-/** A number with so many decimals; one that they round to 0 has no sign. */
+/** A number with fixed decimals; a number that rounds to 0 has no sign. */
 export function fixed(value: number, places: number): string {
   const digits = value.toFixed(places);
   return Number(digits) === 0 ? digits.replace("-", "") : digits.replace("-", "−");
 }
 
-/** Values of an axis whose ticks are `step` apart, all with as many digits as tell them apart. */
+/** Values of an axis with ticks `step` apart, all with as many digits as distinguish them. */
 export function axisNumbers(values: readonly number[], step: number): string[] {
   const largest = Math.max(...values.map(Math.abs), 0);
-  // Small values all along the axis are written by a power of ten.
+  // Small values all along the axis have a power of ten.
   if (largest > 0 && largest < SMALL) {
     const power = Math.floor(Math.log10(largest) + 1e-9);
     const digits = decimalsOf(step / 10 ** power);
@@ -130,7 +128,7 @@ export function axisNumbers(values: readonly number[], step: number): string[] {
   return values.map((value) => grouped(fixed(Math.abs(value) < step / 2 ? 0 : value, decimalsOf(step))));
 }
 
-/** Decimals that multiples of a step have, 12 at most. */
+/** Decimals of multiples of a step, 12 at most. */
 function decimalsOf(step: number): number {
   let places = 0;
   const isWhole = (scaled: number) => Math.abs(scaled - Math.round(scaled)) <= 1e-6 * scaled;
@@ -138,16 +136,16 @@ function decimalsOf(step: number): number {
   return places;
 }
 
-/** Largest value of an axis that is written by a power of ten. */
+/** Largest value of an axis with a power of ten. */
 const SMALL = 1e-3;
 
-/** Digits before the point in groups of three, from five digits on. */
+/** Groups five or more digits before the point by threes. */
 function grouped(text: string): string {
   const [, sign, whole, rest] = /^(−?)(\d+)(.*)$/.exec(text) ?? ["", "", text, ""];
   return whole!.length < 5 ? text : `${sign}${whole!.replace(/\B(?=(\d{3})+$)/g, ",")}${rest}`;
 }
 
-/** A standard deviation or another size, to two digits. */
+/** A standard deviation or other size, to two digits. */
 export function size(value: number): string {
   if (!Number.isFinite(value)) return "—";
   if (value === 0) return "0";
@@ -183,7 +181,7 @@ export function hertz(value: number): string {
   return value < 10 ? `${value.toFixed(1)} Hz` : `${Math.round(value).toLocaleString("en-GB")} Hz`;
 }
 
-/** A time of day, to the tenth of a second. */
+/** Time of day, to the tenth of a second. */
 export function clock(time_s: number): string {
   const date = new Date(time_s * 1000);
   const two = (part: number) => String(part).padStart(2, "0");
@@ -191,13 +189,12 @@ export function clock(time_s: number): string {
   return `${two(date.getHours())}:${two(date.getMinutes())}:${two(date.getSeconds())}.${tenth}`;
 }
 
-/** Date and time of day of an instant, or that nothing tells it. */
+/** Date and time of an instant, or "empty". */
 export function begun(time_s: number | null): string {
   if (time_s === null) return "empty";
   return `${new Date(time_s * 1000).toLocaleDateString("en-GB")} ${clock(time_s)}`;
 }
 
-/** Units as people write them. */
 export function unit(symbol: string): string {
   return symbol.replace(/^u(?=[a-z])/, "µ");
 }

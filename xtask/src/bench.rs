@@ -1,4 +1,4 @@
-//! `cargo xtask bench`: the benchmarks, with their figures saved and compared.
+//! `cargo xtask bench`: the benchmarks, with stored and compared figures.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -11,9 +11,8 @@ use serde_json::Value;
 
 use crate::run;
 
-/// Names the file to which each benchmark adds its figures, a line of JSON each. `palpate_testing::figure` writes them.
+/// Variable with the file for the figures, a line of JSON each, by `palpate_testing::figure`.
 const VARIABLE: &str = "PALPATE_FIGURES";
-/// Folder of saved figures.
 const FOLDER: &str = "target/bench";
 
 /// Options of the chore.
@@ -39,12 +38,10 @@ fn name(text: &str) -> Result<String, String> {
     }
 }
 
-/// Figures by benchmark: medians, with their units.
 type Figures = BTreeMap<String, (f64, String)>;
 
-/// Runs the benchmarks; true when they succeed.
 pub fn run(root: &Path, arguments: &Arguments) -> Result<bool> {
-    // Before minutes of work, as there is nothing to compare with otherwise.
+    // Read first: without it, minutes of benchmarks would be lost.
     let base = arguments.compare.as_ref().map(|name| read(&saved(root, name))).transpose()?;
     let folder = root.join(FOLDER);
     fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
@@ -92,7 +89,7 @@ fn json_lines(figures: &Figures) -> String {
     figures.iter().map(line).collect()
 }
 
-/// Medians beside the saved ones, with their ratio; figures that only one side has.
+/// Includes figures of only one side.
 fn table(name: &str, base: &Figures, figures: &Figures) -> String {
     let width = base
         .keys()

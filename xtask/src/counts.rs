@@ -1,39 +1,35 @@
-//! Number of tests that ran, read off the closing lines of the test runners.
+//! Numbers of tests, read from the closing lines of the test runners.
 
 use std::fmt;
 use std::ops::Add;
 
-/// Tests by result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Ran and passed.
     pub passed: usize,
-    /// Ran and failed, timed out, or could not be started.
+    /// Failed, timed out, or could not start.
     pub failed: usize,
-    /// Did not run, or found a prerequisite missing.
+    /// Did not run, or had no prerequisite.
     pub skipped: usize,
 }
 
 impl Counts {
-    /// Adds up every closing line among `lines`; `None` when there is none, as after a failed build.
+    /// Sums the closing lines; `None` without one, as after a failed build.
     pub fn read(lines: &[String]) -> Option<Self> {
         let sum =
             |read: fn(&str) -> Option<Self>| lines.iter().filter_map(|line| read(line)).reduce(Self::add);
-        // nextest repeats what a failed test printed, and that ends like a run of cargo test.
+        // nextest repeats the output of a failed test, which ends like a run of cargo test.
         sum(nextest).or_else(|| sum(cargo_test))
     }
 
-    /// Reads pytest's closing line; `None` when there is none.
     pub fn of_pytest(lines: &[String]) -> Option<Self> {
         lines.iter().rev().find_map(|line| pytest(line))
     }
 
-    /// Adds up vitest's closing lines; `None` when there is none.
     pub fn of_vitest(lines: &[String]) -> Option<Self> {
         lines.iter().filter_map(|line| vitest(line)).reduce(Self::add)
     }
 
-    /// Counts tests that found a prerequisite missing, which their runner takes as passed, as skipped.
+    /// Moves tests without a prerequisite, which the runner counts as passed, to the skipped ones.
     pub fn with_skips(self, skips: usize) -> Self {
         let moved = skips.min(self.passed);
         Self { passed: self.passed - moved, skipped: self.skipped + moved, ..self }

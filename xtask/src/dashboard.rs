@@ -1,4 +1,4 @@
-//! The dashboard of `palpate serve`: its build, and its tests in Node and in a browser.
+//! Build of the dashboard, and tests in Node and in a browser.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -14,13 +14,12 @@ use crate::needs::NODE;
 use crate::run;
 use crate::skipped::{self, STRICT, Skipped, Skips};
 
-/// Most bytes of the dashboard's scripts and styles, as they are sent without compression.
+/// Largest uncompressed size of scripts and styles.
 const MOST_BYTES: u64 = 150_000;
 
-/// Folder of the built dashboard: in the crate that compiles it, so that the archive of the crate has it too.
+/// In the crate that compiles the dashboard, so that the published archive contains it.
 const BUILT: &str = "crates/palpate-live/dashboard";
 
-/// Builds the dashboard into [`BUILT`], from which `palpate serve` takes it when it is compiled.
 pub fn build(root: &Path) -> Result<bool> {
     if !NODE.is_there(root) {
         println!("{}", NODE.describe());
@@ -29,7 +28,7 @@ pub fn build(root: &Path) -> Result<bool> {
     if !(install(root)? && run::shown(&mut npm(root, &["run", "--silent", "build"]))?) {
         return Ok(false);
     }
-    // Cargo does not see files that were not there when it compiled what holds them.
+    // Cargo does not see files that did not exist when it compiled the file that includes them.
     let holder = root.join("crates/palpate-live/src/server/page.rs");
     let touched = fs::File::options().append(true).open(&holder);
     touched
@@ -40,21 +39,18 @@ pub fn build(root: &Path) -> Result<bool> {
     Ok(bytes <= MOST_BYTES)
 }
 
-/// A dashboard that is being built.
 pub type Building = JoinHandle<Result<bool>>;
 
-/// Builds the dashboard in the background, where Node is.
 pub fn begin_build(root: &Path) -> Option<Building> {
     let root = root.to_path_buf();
     NODE.is_there(&root).then(|| thread::spawn(move || build(&root)))
 }
 
-/// Waits for a dashboard; true where there is none to wait for.
 pub fn wait(building: Option<Building>) -> Result<bool> {
     building.map_or(Ok(true), run::joined)
 }
 
-/// Tests the dashboard in Node and, in a browser, the server that was built with it. They run in real time, and pages are late beside other work.
+/// Tests the dashboard in Node and in a browser, in real time: other work delays pages.
 pub fn test(root: &Path, skips: Skips, skipped: &Skipped) -> Result<(bool, Option<Counts>)> {
     if !NODE.is_there(root) {
         println!("{}", NODE.describe());
@@ -82,7 +78,6 @@ pub fn test(root: &Path, skips: Skips, skipped: &Skipped) -> Result<(bool, Optio
     Ok((succeeded, counts.map(|counts: Counts| counts.with_skips(skips))))
 }
 
-/// Installs what `web/package-lock.json` names, where that has changed since the last time.
 fn install(root: &Path) -> Result<bool> {
     let lock = root.join("web/package-lock.json");
     let wanted = fs::read_to_string(&lock).with_context(|| format!("cannot read {}", lock.display()))?;
@@ -104,7 +99,6 @@ fn npm(root: &Path, arguments: &[&str]) -> Command {
     npm
 }
 
-/// Bytes of the files of a folder.
 fn size(folder: &Path) -> Result<u64> {
     let files = match fs::read_dir(folder) {
         Ok(files) => files,

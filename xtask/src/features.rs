@@ -1,4 +1,4 @@
-//! Features: those that the checks turn on, and a check of their combinations.
+//! Features of the checks, and a check of all combinations.
 
 use std::path::Path;
 use std::process::Command;
@@ -8,20 +8,17 @@ use serde_json::Value;
 
 use crate::run;
 
-/// Features with dependencies that take minutes to compile: `cargo xtask wire` checks them, `cargo xtask test` leaves them out.
+/// Features that take minutes to compile: only `cargo xtask wire` checks them.
 const SLOW: [&str; 2] = ["foxglove", "ros"];
 
-/// Every crate with the features that are off by default but the slow ones, as arguments of cargo.
 pub fn all_but_slow(root: &Path) -> Result<[String; 3]> {
     arguments(&metadata(root)?, |feature| !SLOW.contains(&feature))
 }
 
-/// Every crate with all features, as arguments of cargo.
 pub fn all(root: &Path) -> Result<[String; 3]> {
     arguments(&metadata(root)?, |_| true)
 }
 
-/// Checks every published crate without features, with each feature alone and with all; true when all of them compile.
 pub fn check(root: &Path) -> Result<bool> {
     let combinations = combinations(&metadata(root)?)?;
     let mut failed = Vec::new();
@@ -38,11 +35,10 @@ pub fn check(root: &Path) -> Result<bool> {
     Ok(failed.is_empty())
 }
 
-/// Arguments of cargo for each combination of features of each crate that is published.
 fn combinations(metadata: &Value) -> Result<Vec<Vec<String>>> {
     let packages = metadata["packages"].as_array().context("`cargo metadata` lists no packages")?;
     let mut combinations = Vec::new();
-    // `publish` lists the allowed registries; null is any, and an empty list none.
+    // `publish` lists the allowed registries; null means any, an empty list none.
     for package in packages.iter().filter(|package| package["publish"].is_null()) {
         let name = package["name"].as_str().context("`cargo metadata` has a package without a name")?;
         let features = package["features"].as_object().into_iter().flat_map(|features| features.keys());

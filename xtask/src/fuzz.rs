@@ -1,7 +1,7 @@
 //! `cargo xtask fuzz`: libFuzzer on stable Rust.
 //!
-//! Sanitizers are unstable flags, so `RUSTC_BOOTSTRAP=1` admits them; an explicit `--target` keeps them away from build
-//! scripts and procedural macros, which must not be instrumented.
+//! Sanitizers are unstable flags, so `RUSTC_BOOTSTRAP=1` enables them. An explicit `--target`
+//! excludes build scripts and procedural macros, which must not be instrumented.
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +11,7 @@ use anyhow::{Context, Result, bail};
 
 use crate::run;
 
-/// Compiler flags that `cargo fuzz` passes: the address sanitizer, coverage counters with comparisons, and checked arithmetic.
+/// Flags of `cargo fuzz`.
 const FLAGS: [&str; 9] = [
     "-Zsanitizer=address",
     "-Cpasses=sancov-module",
@@ -24,14 +24,13 @@ const FLAGS: [&str; 9] = [
     "--cfg=fuzzing",
 ];
 
-/// Prints the names of the targets.
 pub fn list(root: &Path) -> Result<bool> {
     println!("fuzz targets, for `cargo xtask fuzz TARGET --seconds N`:");
     targets(root)?.iter().for_each(|target| println!("  {target}"));
     Ok(true)
 }
 
-/// Builds a target and fuzzes for a while; true without a finding. What crashes it is kept in `fuzz/artifacts`.
+/// Returns true without a finding; `fuzz/artifacts` keeps the crashing inputs.
 pub fn run(root: &Path, target: &str, seconds: u32) -> Result<bool> {
     let known = targets(root)?;
     if !known.iter().any(|name| name == target) {

@@ -1,4 +1,5 @@
-//! The project's chores: `cargo xtask test | validate | features | wire | web | wheel | docs | cli-reference | rig-keys | man | tidy | bench | fuzz`.
+//! Tasks of the project: `cargo xtask test | validate | features | wire | web | wheel | docs |
+//! cli-reference | rig-keys | man | tidy | bench | fuzz`.
 #![forbid(unsafe_code)]
 
 mod bench;
@@ -115,7 +116,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// The workspace's folder. Cargo names xtask's own when it runs it; a binary run by hand falls back on where it was built.
+/// Folder of the workspace, from Cargo's environment, or else from the build.
 fn root() -> PathBuf {
     let own =
         env::var_os("CARGO_MANIFEST_DIR").map_or_else(|| env!("CARGO_MANIFEST_DIR").into(), PathBuf::from);

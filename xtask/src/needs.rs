@@ -1,4 +1,4 @@
-//! Prerequisites of the tests beyond Rust: how to find and install each, and which tests run without it.
+//! Prerequisites of the tests beyond Rust: detection and installation.
 
 use std::env;
 use std::ffi::OsString;
@@ -10,35 +10,26 @@ use anyhow::Result;
 
 use crate::run;
 
-/// One prerequisite.
 pub struct Need {
-    /// Name for people.
     pub name: &'static str,
-    /// An environment variable with its place, for a program that is installed elsewhere.
+    /// Variable with the path of a program that is installed elsewhere.
     variable: Option<&'static str>,
-    /// Whether it is at its usual place, or at that of the variable.
     found: fn(&Path, Option<&Path>) -> bool,
-    /// Debian packages that bring it, which are installed when this runs as root on Debian.
+    /// Installed by root on Debian.
     packages: &'static [&'static str],
-    /// Consequence for the tests without it.
     pub without: Without,
 }
 
-/// Consequence for the tests of a missing prerequisite.
 #[derive(Clone, Copy)]
 pub enum Without {
-    /// These tests are skipped, until a person does what `remedy` says.
     Skips {
-        /// The files with the tests.
         tests: &'static [&'static str],
-        /// Remedy for people.
         remedy: &'static str,
     },
-    /// Every test runs all the same, in this other way.
+    /// All tests run in another way.
     FallsBack(&'static str),
 }
 
-/// Runs the tests in parallel, a process each.
 pub const NEXTEST: Need = Need {
     name: "cargo-nextest",
     variable: None,
@@ -47,7 +38,6 @@ pub const NEXTEST: Need = Need {
     without: Without::FallsBack("cargo test runs the tests instead"),
 };
 
-/// Runs the tests of the Python package.
 pub const PYTHON: Need = Need {
     name: "Python with venv",
     variable: None,
@@ -61,7 +51,6 @@ pub const PYTHON: Need = Need {
     },
 };
 
-/// Builds the dashboard, and runs its tests.
 pub const NODE: Need = Need {
     name: "Node with npm",
     variable: None,
@@ -122,7 +111,7 @@ const NEEDS: [Need; 7] = [
     },
 ];
 
-/// Installs what is missing and can be installed here, and returns what is missing still.
+/// Installs missing prerequisites, and returns the rest.
 pub fn missing(root: &Path) -> Result<Vec<Need>> {
     let mut missing = Vec::new();
     for need in NEEDS {
@@ -135,7 +124,6 @@ pub fn missing(root: &Path) -> Result<Vec<Need>> {
 }
 
 impl Need {
-    /// Whether it is on this machine.
     pub fn is_there(&self, root: &Path) -> bool {
         (self.found)(root, self.named().as_deref().map(Path::new))
     }
@@ -144,7 +132,6 @@ impl Need {
         self.variable.and_then(env::var_os)
     }
 
-    /// Description for people: what is missing, what follows and what can be done.
     pub fn describe(&self) -> String {
         match self.without {
             Without::Skips { tests, remedy } => {
@@ -177,7 +164,7 @@ impl Need {
     }
 }
 
-/// True for versions, as `node --version` prints them (`v20.19.1`), from 20.19 on: the dashboard's build asks for that.
+/// The dashboard needs Node 20.19; a version has the form `v20.19.1`.
 fn is_recent_node(version: &str) -> bool {
     let mut numbers =
         version.trim().trim_start_matches('v').split('.').map_while(|number| number.parse::<u32>().ok());
@@ -188,7 +175,7 @@ fn may_install() -> bool {
     Path::new("/etc/debian_version").exists() && run::answers("apt-get", &["--version"]) && is_root()
 }
 
-/// The effective user of this process is root (`Uid:` real, effective, …).
+/// Reads the effective user (`Uid:` real, effective, …).
 fn is_root() -> bool {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let user = status.lines().find_map(|line| line.strip_prefix("Uid:"));

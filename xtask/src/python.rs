@@ -1,4 +1,4 @@
-//! The Python package: its tests in an environment of their own, and its wheel, checked with the oldest and the newest of what it supports.
+//! Tests of the Python package in separate environments, and its wheel.
 
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::fs;
@@ -13,24 +13,20 @@ use crate::needs::PYTHON;
 use crate::run;
 use crate::skipped::{STRICT, Skips};
 
-/// What the tests need, of any version.
+/// Requirements without versions.
 const REQUIREMENTS: &str = "python/tests/requirements.txt";
-/// The oldest versions that the package supports, of what its tests need.
 const OLDEST: &str = "python/tests/oldest.txt";
-/// Most bytes of a wheel.
 const MOST_BYTES: u64 = 6_000_000;
-/// The C library that wheels are for: that of Debian 10, Ubuntu 18.10 and all later ones.
+/// C library of Debian 10, Ubuntu 18.10 and later.
 const MANYLINUX: &str = "manylinux_2_28";
 
-/// An environment in the making.
 pub type Making = JoinHandle<Result<Environment>>;
 
-/// Makes the environment of the tests, `target/xtask/python`, where it is not there, in a thread of its own; `None` without Python.
 pub fn make_environment(root: &Path) -> Option<Making> {
     begin_environment(root, "target/xtask/python", REQUIREMENTS)
 }
 
-/// Makes the environment in `folder` with a file of requirements, where it is not there, in a thread of its own; `None` without Python.
+/// Returns `None` without Python.
 pub fn begin_environment(root: &Path, folder: &'static str, requirements: &'static str) -> Option<Making> {
     let root = root.to_path_buf();
     PYTHON
@@ -38,7 +34,7 @@ pub fn begin_environment(root: &Path, folder: &'static str, requirements: &'stat
         .then(|| thread::spawn(move || Environment::at(&root, folder, "python3", &[requirements])))
 }
 
-/// Runs the tests of the package in an environment of their own; what `tested` tells cargo to build holds the package.
+/// `tested` are the arguments of cargo's build.
 pub fn test(
     root: &Path,
     skips: Skips,
@@ -56,7 +52,7 @@ pub fn test(
     }
     let built = root.join("target/debug").join(format!("{DLL_PREFIX}_palpate{DLL_SUFFIX}"));
     let module = root.join("python/palpate/_palpate.abi3.so");
-    // A module that some Python has loaded is replaced, not written over.
+    // Python processes may have loaded the module: it is replaced, not overwritten.
     let copied = module.with_extension("part");
     fs::copy(&built, &copied)
         .and_then(|_| fs::rename(&copied, &module))
@@ -71,7 +67,6 @@ pub fn test(
     Ok((watched.succeeded, Counts::of_pytest(&watched.lines)))
 }
 
-/// Builds the wheel and runs the package's tests on it, in fresh environments with the newest and with the oldest of what it supports.
 pub fn wheel(root: &Path) -> Result<bool> {
     let tools = Environment::at(root, "target/xtask/maturin", "python3", &["python/wheel.txt"])?;
     let wheels = root.join("target/wheels");
@@ -94,7 +89,7 @@ pub fn wheel(root: &Path) -> Result<bool> {
     let size = format!("{:.2} MB", bytes as f64 / 1e6);
     println!("{}: {size}; at most {} MB", wheel.display(), MOST_BYTES / 1_000_000);
     let mut succeeded = bytes <= MOST_BYTES;
-    // The oldest Python that is here stands for the oldest of all.
+    // The oldest installed Python represents the oldest of all.
     let oldest = ["python3.10", "python3.11", "python3"]
         .into_iter()
         .find(|python| run::answers(python, &["--version"]));
@@ -117,13 +112,11 @@ pub fn wheel(root: &Path) -> Result<bool> {
     Ok(succeeded)
 }
 
-/// A virtual environment.
 pub struct Environment {
     folder: PathBuf,
 }
 
 impl Environment {
-    /// The environment in a folder, with what these files require; made anew where it is not there, or was made from other requirements.
     fn at(root: &Path, folder: &str, python: &str, requirements: &[&str]) -> Result<Self> {
         let own = Self { folder: root.join(folder) };
         let wanted: Result<Vec<String>> = requirements
@@ -140,7 +133,7 @@ impl Environment {
         let mut make = Command::new(python);
         let mut install = own.run("python");
         install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]).current_dir(root);
-        // The first file may be of any version: what others say of the same packages constrains it.
+        // The first file may name any version; the others constrain it.
         for (i, file) in requirements.iter().enumerate() {
             install.args([if i == 0 { "-r" } else { "-c" }, file]);
         }
@@ -151,7 +144,6 @@ impl Environment {
         Ok(own)
     }
 
-    /// A program of the environment.
     pub fn run(&self, program: &str) -> Command {
         let programs = self.folder.join(if cfg!(windows) { "Scripts" } else { "bin" });
         let mut command = Command::new(programs.join(program));
@@ -164,7 +156,6 @@ impl Environment {
         command
     }
 
-    /// The tests of the package.
     fn pytest(&self, root: &Path) -> Command {
         let mut tests = self.run("python");
         tests.args([
@@ -174,20 +165,19 @@ impl Environment {
             "../pyproject.toml",
             "-q",
             "--durations=10",
-            // A worker a core: checks of types and most fits have one thread.
+            // One worker per core: checks of types and most fits have one thread.
             "--numprocesses=auto",
-            // A worker that has none left takes over tests of another, lest a long one run alone at the end.
+            // An idle worker takes tests of another, so that no long test runs alone at the end.
             "--dist=worksteal",
             "-p",
             "no:cacheprovider",
         ]);
-        // Not in the folder of the package, which would be found before the one that is installed.
+        // Not in the folder of the package, which Python would import instead of the installed one.
         tests.current_dir(root.join("python/tests"));
         tests
     }
 }
 
-/// Removes a folder with what is in it, where it is there.
 fn remove(folder: &Path) -> Result<()> {
     match fs::remove_dir_all(folder) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => {

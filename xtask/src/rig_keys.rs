@@ -1,7 +1,7 @@
-//! `cargo xtask rig-keys`: docs/reference/rig-keys.md from the types that rig and study files are read into.
+//! `cargo xtask rig-keys`: docs/reference/rig-keys.md from the types of rig and study files.
 //!
-//! A key is a field of a struct in crates/palpate-rig, a word is a variant of an enum there or in a crate that it uses; what the page says
-//! of them is their doc comments.
+//! Keys are fields of structs, words are variants of enums; their doc comments are the
+//! explanations.
 
 mod page;
 mod source;
@@ -13,7 +13,6 @@ use anyhow::{Context, Result};
 
 const PAGE: &str = "docs/reference/rig-keys.md";
 
-/// Writes the page.
 pub fn run(root: &Path) -> Result<bool> {
     let page = page::page(root)?;
     fs::write(root.join(PAGE), page).with_context(|| format!("cannot write {PAGE}"))?;
@@ -52,7 +51,7 @@ mod tests {
             }
         }
         assert!(keys > 100, "{keys} keys");
-        // A type that was not found would stand in its cell.
+        // The name of an unresolved type would be in the cell.
         let value = |line: &str| line.split(" | ").nth(1).unwrap_or_default().to_owned();
         let unknown = page.lines().find(|line| value(line).starts_with(char::is_uppercase));
         assert_eq!(unknown, None);

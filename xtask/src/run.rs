@@ -1,4 +1,4 @@
-//! Running a command so that a person sees its output as it comes.
+//! Commands with visible output.
 
 use std::io::{self, BufRead, BufReader, IsTerminal, Read, Write};
 use std::panic::resume_unwind;
@@ -7,26 +7,24 @@ use std::thread::{self, JoinHandle};
 
 use anyhow::{Context, Result};
 
-/// Result of a command, with its output.
 pub struct Kept {
-    /// Whether it exited with 0.
     pub succeeded: bool,
-    /// Everything it printed, without colours: its output first, then its error output.
+    /// Output without colours, then error output.
     pub lines: Vec<String>,
 }
 
-/// Result of a thread that ends; its panic goes on here.
+/// Joins a thread; forwards a panic.
 pub fn joined<T>(thread: JoinHandle<T>) -> T {
     thread.join().unwrap_or_else(|panic| resume_unwind(panic))
 }
 
-/// Runs a command with an empty standard input; true when it exits with 0.
+/// Runs a command with an empty standard input.
 pub fn shown(command: &mut Command) -> Result<bool> {
     let status = command.stdin(Stdio::null()).status().with_context(|| cannot_start(command))?;
     Ok(status.success())
 }
 
-/// Runs a command, shows what it prints as it comes, and keeps it.
+/// Runs a command, and shows and keeps its output.
 pub fn watched(command: &mut Command) -> Result<Kept> {
     if io::stderr().is_terminal() {
         command.env("CARGO_TERM_COLOR", "always");
@@ -45,14 +43,12 @@ pub fn watched(command: &mut Command) -> Result<Kept> {
     Ok(Kept { succeeded: status.success(), lines })
 }
 
-/// True when the program can be started and exits with 0.
 pub fn answers(program: &str, arguments: &[&str]) -> bool {
     let mut command = Command::new(program);
     command.args(arguments).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     command.status().is_ok_and(|status| status.success())
 }
 
-/// Output of a program that can be started and exits with 0.
 pub fn answer(program: &str, arguments: &[&str]) -> Option<String> {
     let output = Command::new(program).args(arguments).stdin(Stdio::null()).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).into_owned())
@@ -76,7 +72,6 @@ fn pass_on(from: Option<impl Read>, mut to: impl Write) -> io::Result<Vec<String
     Ok(lines)
 }
 
-/// Drops the escape sequences that set colours: `ESC [ … letter`.
 fn without_colours(line: &str) -> String {
     let mut plain = String::with_capacity(line.len());
     let mut rest = line.chars();

@@ -1,4 +1,4 @@
-//! Rust source as rules and pages need it: the paths that it uses, the modules that it declares, and its comments.
+//! Paths, module declarations and comments of Rust source.
 
 use std::ops::Range;
 
@@ -7,28 +7,25 @@ use proc_macro2::{Delimiter, LineColumn, Spacing, Span, TokenStream, TokenTree};
 use syn::visit::{self, Visit};
 use syn::{Attribute, Field, ImplItem, Item, ItemMod, ItemUse, Local, Macro, Path, TraitItem, UseTree};
 
-/// A path of the code, groups such as `a::{b, c}` taken apart.
+/// A path; groups such as `a::{b, c}` are expanded.
 #[derive(Debug, PartialEq, Eq)]
 pub struct UsedPath {
-    /// Counted from 1.
+    /// From 1.
     pub line: usize,
-    /// `*` included, a closing `self` left out.
+    /// With `*`, but without a final `self`.
     pub segments: Vec<String>,
-    /// Name that a `use` declaration gives to it.
     pub imported: Option<String>,
 }
 
-/// Paths and modules of a file, without the items under `#[cfg(test)]`.
 #[derive(Debug, Default)]
 pub struct Uses {
-    /// Every path, in expressions, types, `use` declarations and arguments of macros.
+    /// Paths in expressions, types, `use` declarations and macro arguments.
     pub paths: Vec<UsedPath>,
-    /// Modules in files of their own: `mod name;`.
+    /// Modules in files: `mod name;`.
     pub modules: Vec<String>,
 }
 
 impl Uses {
-    /// Collects the paths and modules of a file.
     pub fn of(file: &syn::File) -> Self {
         let mut uses = Self::default();
         uses.visit_file(file);
@@ -59,7 +56,7 @@ impl Uses {
         self.paths.push(UsedPath { line, segments, imported });
     }
 
-    /// Paths among tokens that syn does not parse: names joined by `::`.
+    /// Adds names joined by `::` among tokens that syn does not parse.
     fn add_tokens(&mut self, tokens: TokenStream) {
         let mut path = Vec::new();
         let (mut line, mut colons) = (0, 0);
@@ -209,18 +206,11 @@ fn line_of_tree(tree: &UseTree) -> usize {
     span.start().line
 }
 
-/// Parses a file.
-///
-/// # Errors
-/// With line and column.
 pub fn parse(text: &str) -> Result<syn::File> {
     syn::parse_file(text).map_err(|error| at(error.span(), &error))
 }
 
-/// The comments of a file, doc comments included. All else is blank, and lines keep their numbers.
-///
-/// # Errors
-/// With line and column, for text that is not Rust.
+/// Returns all comments of a file; the rest is blank, and lines keep their numbers.
 pub fn comments(text: &str) -> Result<String> {
     let tokens: TokenStream =
         text.parse().map_err(|error: proc_macro2::LexError| at(error.span(), &error))?;
@@ -233,7 +223,7 @@ pub fn comments(text: &str) -> Result<String> {
     Ok(String::from_utf8(left)?)
 }
 
-/// Bytes of the tokens that are no doc comments.
+/// Adds the byte ranges of tokens other than doc comments.
 fn add_code(tokens: TokenStream, code: &mut Vec<Range<usize>>) {
     let is_comment = |span: Span| span.source_text().is_some_and(|text| text.starts_with(['/']));
     for token in tokens {
@@ -245,7 +235,7 @@ fn add_code(tokens: TokenStream, code: &mut Vec<Range<usize>>) {
                 }
                 add_code(group.stream(), code);
             }
-            // `/` itself starts a token that is no comment.
+            // `/` itself begins a token that is not a comment.
             TokenTree::Punct(punct) if punct.as_char() != '#' && punct.as_char() != '!' => {
                 code.push(punct.span().byte_range());
             }

@@ -1,4 +1,4 @@
-//! The documentation site: docs/ and the docstrings of the Python package, by MkDocs, into target/site.
+//! Documentation site by MkDocs in target/site: docs/ and the docstrings of the Python package.
 
 use std::path::Path;
 
@@ -9,15 +9,13 @@ use crate::python::{self, Environment, Making};
 use crate::run;
 use crate::skipped::{Skipped, Skips};
 
-/// Exact versions of MkDocs, its theme and its plugins.
 const REQUIREMENTS: &str = "docs/requirements.txt";
 
-/// Makes the environment of MkDocs, `target/xtask/docs`, where it is not there, in a thread of its own; `None` without Python.
 pub fn make_environment(root: &Path) -> Option<Making> {
     python::begin_environment(root, "target/xtask/docs", REQUIREMENTS)
 }
 
-/// Builds the site; false without Python, or with a dead link, a dead anchor or a page that the navigation lacks.
+/// Fails without Python, or for a dead link or anchor, or a page outside the navigation.
 pub fn build(root: &Path) -> Result<bool> {
     let Some(environment) = make_environment(root) else {
         println!("{}", PYTHON.describe());
@@ -26,7 +24,7 @@ pub fn build(root: &Path) -> Result<bool> {
     built(root, &run::joined(environment)?)
 }
 
-/// Builds the site as a test, which is skipped without Python or its package index.
+/// Skips without Python or its package index.
 pub fn test(root: &Path, skips: Skips, skipped: &Skipped, environment: Option<Making>) -> Result<bool> {
     let Some(environment) = environment else {
         println!("{}", PYTHON.describe());
@@ -44,7 +42,7 @@ pub fn test(root: &Path, skips: Skips, skipped: &Skipped, environment: Option<Ma
 
 fn built(root: &Path, environment: &Environment) -> Result<bool> {
     let mut mkdocs = environment.run("mkdocs");
-    // The theme advertises its successor, which ARCHITECTURE.md weighs.
+    // The theme advertises its successor, which ARCHITECTURE.md discusses.
     mkdocs.args(["build", "--strict", "--quiet"]).env("NO_MKDOCS_2_WARNING", "1").current_dir(root);
     let succeeded = run::shown(&mut mkdocs)?;
     if succeeded {

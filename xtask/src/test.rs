@@ -1,4 +1,4 @@
-//! `cargo xtask test`: every check, in order, going on after one that fails.
+//! `cargo xtask test`: every check, also after a failure.
 
 use std::path::Path;
 use std::process::Command;
@@ -17,10 +17,9 @@ use crate::site;
 use crate::skipped::{self, STRICT, Skipped, Skips};
 use crate::tidy;
 
-/// Targets that tests need, with the features of all that is checked, lest another choice of them compiles it all again for the Python package.
+/// The build and the Python tests share these targets, so that cargo compiles once.
 const TARGETS: [&str; 3] = ["--lib", "--tests", "--bin=palpate"];
 
-/// Result of one step.
 struct Step {
     name: &'static str,
     succeeded: bool,
@@ -28,7 +27,6 @@ struct Step {
     counts: Option<Counts>,
 }
 
-/// Runs every check; true when all of them succeed.
 pub fn run(root: &Path, skips: Skips) -> Result<bool> {
     let skipped = Skipped::begin(root)?;
     let mut missing = Vec::new();
@@ -36,7 +34,7 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
     let everything = [workspace.as_str(), &with, &features];
     let tested = [&everything[..], &TARGETS].concat();
     let prerequisites = step("prerequisites", || prerequisites(root, skips, &mut missing))?;
-    // Python's environment and the dashboard are made while the compiler waits for one crate or another; the server contains the dashboard.
+    // Built while the compiler does not use all cores; the server contains the dashboard.
     let environment = python::make_environment(root);
     let site = site::make_environment(root);
     let dashboard = dashboard::begin_build(root);
@@ -72,7 +70,6 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
     Ok(steps.iter().all(|step| step.succeeded))
 }
 
-/// Whether a step succeeded, and the tests it counted.
 type Outcome = Result<(bool, Option<Counts>)>;
 
 fn step(name: &'static str, act: impl FnOnce() -> Outcome) -> Result<Step> {
@@ -97,7 +94,7 @@ fn prerequisites(root: &Path, skips: Skips, missing: &mut Vec<String>) -> Outcom
 
 fn tests(root: &Path, skips: Skips, skipped: &Skipped, everything: &[&str]) -> Outcome {
     let mut command = if NEXTEST.is_there(root) {
-        // Two more than there are cores: many a test waits for a board or a server.
+        // Two more than there are cores: many tests wait for a board or a server.
         let threads =
             format!("--test-threads={}", thread::available_parallelism().map_or(2, |cores| cores.get() + 2));
         cargo(root, &[&["nextest", "run", "--no-fail-fast", &threads], everything].concat())
@@ -128,7 +125,6 @@ fn watched(mut command: Command) -> Outcome {
     Ok((watched.succeeded, Counts::read(&watched.lines)))
 }
 
-/// The table of steps, what was skipped and why, the failed steps, and the counts on a line of their own.
 fn closing(steps: &[Step], missing: &[String], skipped: &[String]) -> String {
     let mut text = format!("{:<14} {:<6} {:>8}\n", "step", "result", "seconds");
     for step in steps {

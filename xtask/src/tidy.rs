@@ -1,6 +1,6 @@
-//! `cargo xtask tidy`: the rules of the project that a program can check.
+//! `cargo xtask tidy`: rules of the project that a program can check.
 //!
-//! Each rule is a function from the project, as read, to findings; none touches the disk.
+//! Each rule is a function from the project to findings, and does not read the disk.
 
 mod binary;
 mod changelog;
@@ -19,11 +19,10 @@ use anyhow::Result;
 
 use project::Project;
 
-/// Something that breaks a rule.
 #[derive(Debug, PartialEq, Eq)]
 struct Finding {
     path: String,
-    /// Counted from 1.
+    /// From 1.
     line: usize,
     message: String,
 }
@@ -48,7 +47,6 @@ const RULES: [(&str, Rule); 9] = [
     ("samples are the examples", samples::findings),
 ];
 
-/// Checks every rule and prints what breaks one; true when none is broken.
 pub fn run(root: &Path) -> Result<bool> {
     let project = Project::read(root)?;
     let mut failures = 0;

@@ -1,4 +1,4 @@
-//! `cargo xtask wire`: the sinks whose dependencies take minutes to compile, ROS 2 through Zenoh and Foxglove's WebSocket.
+//! `cargo xtask wire`: sinks with slow dependencies, ROS 2 through Zenoh and Foxglove's WebSocket.
 
 use std::path::Path;
 use std::process::Command;
@@ -9,7 +9,6 @@ use crate::features;
 use crate::needs::NEXTEST;
 use crate::run;
 
-/// Builds the sinks, and runs their tests over real routers and sockets, clippy and the documentation; true when all of them succeed.
 pub fn run(root: &Path) -> Result<bool> {
     let [workspace, with, features] = features::all(root)?;
     let everything = [workspace.as_str(), &with, &features];

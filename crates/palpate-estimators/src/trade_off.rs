@@ -1,24 +1,17 @@
-//! Contacts near the ends of a line, where a force that is not known and the place trade off.
+//! Confidence intervals near the ends of a line, where an unknown force and the place trade off.
 //!
-//! Beside a support a harder contact nearer to it reads like a softer one farther away: readings there tell the product of force and
-//! place, and hardly more. Neither a normal distribution nor equal tails describe that, so here
+//! - The force is bounded, by the bench or by a multiple of the calibration's.
+//! - The 95 % region contains every contact with a cost (χ² plus the log determinant of the channels'
+//!   covariance) at most q above the least. q is 3.84 away from the ends and 2.71 at an end, for 95 %
+//!   coverage at every place (Feldman and Cousins, Physical Review D 57, 1998). Intervals are projections of
+//!   the region.
+//! - With extrapolated variances ([`Contacts::extrapolates`]) the log determinant counts up to that of the
+//!   best contact, and of more channels than unknowns the worst one does not count.
+//! - Where a segment of the region reaches an end, the estimate is the posterior median of its places: it has
+//!   the least mean error. The prior is flat in the place and in the size of the signal.
 //!
-//! - the force is at most a bound, a multiple of what the calibration pressed with or what the bench gives;
-//! - the 95 % region holds every contact whose cost, minus twice the logarithm of its likelihood, is at most q above the least: χ² plus the logarithm
-//!   of the determinant of the channels' covariance, which grows with the force where influences are of finitely many presses.
-//!   By the likelihood ratio q is 3.84 away from the ends; towards
-//!   an end, where the place has a boundary, it falls to 2.71, such that 95 % of the readings of every place are covered (Feldman and
-//!   Cousins, Physical Review D 57, 1998). The intervals of place and force are the region's projections, and hold the best contact
-//!   whatever the reading;
-//! - where influences are extrapolated beyond the outermost press, their variances are hardly more than a guess, and too large ones would exclude what they
-//!   leave open: there the determinant counts up to that of the best contact. A sensor beside the outermost press, which presses on one of its sides do not
-//!   show, leaves the influences of its channel beyond it open: of more channels than unknowns the one that explains a contact worst does not count
-//!   ([`Contacts::extrapolates`]);
-//! - where a stretch of places in the region reaches an end, the estimate is their posterior median, the prior being flat in the place
-//!   and in the size of the signal, with the best force there. Of all estimates it has the least mean error over the places.
-//!
-//! Symbols: d reading and f influence per newton, both over the noise; W force, a place; μ distance between the reading of a contact and
-//! the readings at the end, in standard deviations.
+//! Symbols: d reading and f influence per newton, both over the noise; W force; μ distance from the readings
+//! at the end, in standard deviations.
 
 use std::sync::OnceLock;
 
@@ -27,96 +20,79 @@ use palpate_numerics::{bisect, hull, normal_cdf, normal_interval_95};
 
 use crate::status::OTHER_PLACE;
 
-/// A contact farther than so many standard deviations from both ends is described by a normal distribution.
+/// Distance from both ends for a normal distribution, in standard deviations.
 const CLEAR_OF_ENDS: f64 = 12.0;
 
-/// True for a place so near to an end of a line, in standard deviations, that [`Contacts`] have to tell its interval.
+/// True of a place that needs an interval by [`Contacts`].
 #[inline(always)]
 pub(crate) fn is_near_end(x_m: f64, sd_m: f64, length_m: f64) -> bool {
     !(CLEAR_OF_ENDS * sd_m < x_m && CLEAR_OF_ENDS * sd_m < length_m - x_m)
 }
 
-/// Factor of q where influences and noise come from finitely many presses: their errors are common to all channels of a
-/// contact and to all forces, which variances channel by channel do not say.
+/// Factor of q for learnt influences and noise: their errors are common to all channels and forces.
 ///
-/// Without it 90.7 % of 4,000 readings over 200 calibrations of 20 presses were covered in the worst row of `trade_off/coverage.rs`.
+/// Without it, the worst row of `trade_off/coverage.rs` has 90.7 % coverage.
 pub(crate) const CALIBRATED: f64 = 1.1;
 
-/// q of places that a barrier of greater χ² parts from the best: there the likelihood is 1 % of the best, as of other places that are told.
-/// Noise decides for the wrong side so surely in at most 0.12 % of the readings, which are lost besides the 5 % of one side. (With a
-/// distance of δ standard deviations between both sides, χ² differs by 2·δ·z − δ², z ~ N(0, 1), which exceeds q most often for δ = √q,
-/// when z does.)
+/// q of places behind a barrier of χ²: −2·ln 0.01, the likelihood ratio of other modes.
+///
+/// At most 0.12 % of the readings prefer the wrong side by q: with δ standard deviations between both, χ²
+/// differs by 2·δ·z − δ², z ~ N(0, 1), which exceeds q most often at δ = √q.
 const BEYOND_A_BARRIER: f64 = 9.21;
 
-/// Knowledge of the force beforehand, in newtons.
+/// Prior of the force, in newtons.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Force {
-    /// It is this.
     Known(f64),
-    /// It is no more than this.
     AtMost(f64),
-    /// Nothing.
     Unknown,
 }
 
 impl Force {
-    /// A force that is not known, with its bound where there is one.
     pub fn at_most(greatest_force_n: Option<f64>) -> Self {
         greatest_force_n.map_or(Self::Unknown, Self::AtMost)
     }
 }
 
-/// Writes d and f of every channel at a place, over the standard deviation that the channel has for a contact of a force there; the sum of the logarithms
-/// of their variances.
+/// Writes d and f of every channel at a place and force, over its standard deviation; returns the log
+/// determinant of the variances.
 pub(crate) type Channels<'a> = dyn Fn(f64, f64, &mut Vec<[f64; 2]>) -> f64 + 'a;
 
-/// Contacts on a line, as one reading has them.
+/// Likelihood of contacts for one reading.
 pub(crate) struct Contacts<'a> {
-    /// Length of the line in metres.
     pub length_m: f64,
     pub force: Force,
-    /// Factor of q: 1 where influences and noise are known, or [`CALIBRATED`].
+    /// 1 for known influences and noise, else [`CALIBRATED`].
     pub widening: f64,
-    /// The force at which channels are weighed first, in newtons.
     pub reference_force_n: f64,
-    /// True where influences near the ends are extrapolated: contacts whose reading they leave open are not excluded for that, and one channel may be
-    /// anything.
+    /// True for extrapolated influences near the ends; one channel may then have any error.
     pub extrapolates: bool,
-    /// d and f of every channel.
     pub channels: &'a Channels<'a>,
 }
 
-/// The contacts that a reading does not exclude.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct NotExcluded {
-    /// The least χ² of a contact with no more than the greatest force.
     pub misfit: f64,
-    /// The 95 % interval of the place over all stretches, in metres.
     pub x_95_m: (f64, f64),
-    /// The 95 % interval of the force over all stretches, in newtons; `None` where it is known.
+    /// `None` for a known force.
     pub force_95_n: Option<(f64, f64)>,
-    /// The stretches of places, most probable first; at least one.
+    /// Most probable first; at least one.
     pub stretches: Vec<Stretch>,
 }
 
-/// Places side by side that a reading does not exclude.
+/// Contiguous places of the confidence region.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stretch {
-    /// Ends, in metres.
     pub x_95_m: (f64, f64),
-    /// The forces at its places that the reading does not exclude, in newtons.
     pub force_95_n: (f64, f64),
-    /// Estimated place in metres, and force there in newtons.
     pub x_m: f64,
     pub force_n: f64,
-    /// Mean squares of place, place and force, and force about these: m², m·N, N².
+    /// Mean squares about the estimate: m², m·N, N².
     pub covariance: [f64; 3],
-    /// Share of the posterior probability.
     pub probability: f64,
 }
 
 impl NotExcluded {
-    /// Writes position, force and intervals, and where other stretches are too probable, these as modes.
     pub fn write(&self, estimate: &mut Estimate) {
         let Some((best, others)) = self.stretches.split_first() else { return };
         estimate.contact = best.contact_within(self.x_95_m, self.force_95_n);
@@ -131,7 +107,6 @@ impl NotExcluded {
 }
 
 impl Stretch {
-    /// The contact with these intervals.
     fn contact_within(&self, x_95_m: (f64, f64), force_95_n: Option<(f64, f64)>) -> ContactEstimate {
         let uncertainty = Uncertainty { force_95_n, ..Uncertainty::on_line(self.covariance, x_95_m) };
         ContactEstimate {
@@ -142,7 +117,6 @@ impl Stretch {
     }
 }
 
-/// The best force at a place.
 #[derive(Clone, Copy, Debug)]
 struct Best {
     x_m: f64,
@@ -150,11 +124,11 @@ struct Best {
     /// 1/variance of the force.
     precision: f64,
     misfit: f64,
-    /// The logarithm of the determinant.
+    /// Log determinant.
     spread: f64,
     /// q.
     bound: f64,
-    /// True where a greater force than the greatest would explain the reading better.
+    /// True where the bound of the force is active.
     is_held: bool,
 }
 
@@ -164,19 +138,17 @@ impl Best {
     }
 }
 
-/// The places that a reading does not exclude, by their costs.
 #[derive(Clone, Copy, Debug)]
 struct Region {
-    /// The least cost of all places.
     least: f64,
-    /// The logarithm of the determinant counts up to this.
+    /// Limit of the log determinant.
     most_spread: f64,
-    /// The least q.
+    /// Least q.
     floor: f64,
 }
 
 impl Region {
-    /// Distance of the cost of a place below the greatest that is not excluded; negative where it is excluded.
+    /// Margin below q; negative where a place is excluded.
     fn left(&self, at: &Best) -> f64 {
         at.bound.max(self.floor) - (at.misfit + at.spread.min(self.most_spread) - self.least)
     }
@@ -187,17 +159,12 @@ impl Region {
 }
 
 impl Contacts<'_> {
-    /// Cells between the places that are looked at.
     const CELLS: usize = 64;
-    /// Places within the cells at the ends, each half as far from the end as the one before.
     const HALVINGS: i32 = 8;
-    /// Halvings of the way to the edge of a stretch.
     const EDGE_HALVINGS: usize = 24;
-    /// Places within a stretch over which its probability is summed up.
     const WITHIN: usize = 24;
 
-    /// The contacts that the reading does not exclude; `minima_m` are places where another search has found its χ² to be low.
-    /// `None` where no place explains anything in numbers.
+    /// Returns the confidence region, given local minima of χ²; `None` without a finite χ².
     pub fn not_excluded(&self, minima_m: &[f64]) -> Option<NotExcluded> {
         let mut buffer = Vec::new();
         let ends = self.end_readings(&mut buffer);
@@ -236,7 +203,7 @@ impl Contacts<'_> {
         Some(NotExcluded { misfit, x_95_m, force_95_n, stretches })
     }
 
-    /// The best forces at places all over the line, in rising order; among them where the greatest force begins to hold the best.
+    /// In rising order, with the places where the bound of the force becomes active.
     fn look_over(&self, minima_m: &[f64], look: &mut impl FnMut(f64) -> Best) -> Vec<Best> {
         let h_m = self.length_m / Self::CELLS as f64;
         let halved = (1..=Self::HALVINGS).map(|k| h_m * 0.5f64.powi(k));
@@ -258,7 +225,7 @@ impl Contacts<'_> {
         looked
     }
 
-    /// Indices of the places around the best, up to barriers that are higher than what is not excluded behind them.
+    /// Places around the best, up to barriers.
     fn around_best(&self, looked: &[Best], region: &Region) -> std::ops::Range<usize> {
         let barrier = Region { floor: self.widening * BEYOND_A_BARRIER, ..*region };
         let is_barrier = |at: &Best| !barrier.holds(at);
@@ -268,7 +235,6 @@ impl Contacts<'_> {
         from..to
     }
 
-    /// The stretch around a run of places in the region, between two that are not.
     fn stretch(
         &self,
         run: &[Best],
@@ -281,7 +247,7 @@ impl Contacts<'_> {
             Some(outside) => edge(inside, &outside, Self::EDGE_HALVINGS, look, |at| region.holds(at)),
         };
         let (first, last) = (end(&run[0], before), end(&run[run.len() - 1], after));
-        // Where nothing but the greatest force ends a stretch, it reaches the end as far as a place can be told.
+        // The bound of the force counts as the end of the line.
         let reaches = |edge: &Best, outside: Option<Best>| outside.is_none_or(|o| o.is_held) || edge.is_held;
         let way_m = last.x_m - first.x_m;
         let step = |i: usize| first.x_m + way_m * (i as f64 + 0.5) / Self::WITHIN as f64;
@@ -305,20 +271,19 @@ impl Contacts<'_> {
         }
     }
 
-    /// The least and the greatest force in the region at these places.
     fn forces(&self, within: &[Best], region: &Region) -> (f64, f64) {
         let most = if let Force::AtMost(most) = self.force { most } else { f64::INFINITY };
         let mut forces = (f64::INFINITY, 0.0f64);
         for at in within {
             let left = region.left(at).max(0.0);
-            // At the end itself no force has an effect, and any is possible.
+            // At the end itself the force has no effect.
             let half = if at.precision > 0.0 { (left / at.precision).sqrt() } else { 0.0 };
             forces = (forces.0.min(at.force_n - half), forces.1.max(at.force_n + half));
         }
         (forces.0.max(0.0), forces.1.min(most))
     }
 
-    /// Readings of contacts at both ends: f there where the force is known, and just beside them, divided by |f|, where it is not.
+    /// f at both ends for a known force; else just beside them, normalized.
     fn end_readings(&self, buffer: &mut Vec<[f64; 2]>) -> [Vec<f64>; 2] {
         const BESIDE: f64 = 1e-5;
         let is_known = matches!(self.force, Force::Known(_));
@@ -333,10 +298,10 @@ impl Contacts<'_> {
 
     fn best(&self, x_m: f64, ends: &[Vec<f64>; 2], buffer: &mut Vec<[f64; 2]>) -> Best {
         let (force_n, is_held, spread) = self.best_force(x_m, buffer);
-        // Summed, as |d|² − W·(2·d·f − W·|f|²) loses all digits of a good fit.
+        // |d|² − W·(2·d·f − W·|f|²) would cancel in a good fit.
         let squares = || buffer.iter().map(|[d, f]| (d - force_n * f).powi(2));
         let unknowns = if let Force::Known(_) = self.force { 1 } else { 2 };
-        // Of no more channels than unknowns those that are left would explain any contact.
+        // With no more channels than unknowns, the remaining channels would explain any contact.
         let leaves_out = self.extrapolates && buffer.len() > unknowns;
         let open = if leaves_out { squares().fold(0.0, f64::max) } else { 0.0 };
         let misfit = squares().sum::<f64>() - open;
@@ -354,10 +319,8 @@ impl Contacts<'_> {
         Best { x_m, force_n, precision, misfit, spread, bound, is_held }
     }
 
-    /// The best force at a place, whether a greater one than the greatest would be better, and the sum of the logarithms of the variances; leaves d
-    /// and f in the buffer.
+    /// Leaves d and f in the buffer; the flag marks an active bound.
     fn best_force(&self, x_m: f64, buffer: &mut Vec<[f64; 2]>) -> (f64, bool, f64) {
-        /// Times that channels are weighed anew by the force.
         const WEIGHED: usize = 3;
         if let Force::Known(force_n) = self.force {
             let spread = (self.channels)(x_m, force_n, buffer);
@@ -383,7 +346,7 @@ impl Contacts<'_> {
     }
 }
 
-/// The last place from `inside` towards `outside` of which `holds` is true, to so many halvings of the way.
+/// Bisects for the last place with `holds`.
 fn edge(
     inside: &Best,
     outside: &Best,
@@ -403,7 +366,6 @@ fn edge(
     good
 }
 
-/// Posterior over places in the middles of equal parts of a stretch.
 struct Weighed {
     densities: Vec<f64>,
     /// Mean density.
@@ -418,7 +380,7 @@ impl Weighed {
         Self { weight: sum / within.len() as f64, densities, sum }
     }
 
-    /// Share of a stretch on whose either side half of the probability is.
+    /// Median relative to the segment.
     fn median(&self) -> f64 {
         let mut before = 0.0;
         for (i, density) in self.densities.iter().enumerate() {
@@ -430,7 +392,6 @@ impl Weighed {
         0.5
     }
 
-    /// Mean squares about a contact.
     fn covariance(&self, about: &Best, within: &[Best]) -> [f64; 3] {
         let variance = if about.precision > 0.0 { about.precision.recip() } else { 0.0 };
         if self.sum <= 0.0 {
@@ -445,8 +406,7 @@ impl Weighed {
     }
 }
 
-/// The 95 % interval of a place on a line by a normal distribution about `x_m`, which may lie beyond the ends: it holds the best place on
-/// the line, and covers at the ends as elsewhere.
+/// Returns the 95 % interval of a place by a normal distribution about `x_m`, which may lie beyond the ends.
 pub(crate) fn interval_on_line_95(x_m: f64, sd_m: f64, length_m: f64) -> (f64, f64) {
     if !is_near_end(x_m, sd_m, length_m) || sd_m.is_nan() || sd_m <= 0.0 {
         return normal_interval_95(x_m, sd_m);
@@ -463,11 +423,10 @@ pub(crate) fn interval_on_line_95(x_m: f64, sd_m: f64, length_m: f64) -> (f64, f
     (to(0.0), to(length_m))
 }
 
-/// q: the greatest χ² − χ²_min at which a place at distance μ from the boundary is not excluded, such that 95 % of its readings do not
-/// exclude it.
+/// Returns q: the critical value of χ² − χ²_min at distance μ from the boundary, for 95 % coverage.
 ///
-/// With z ~ N(μ, 1) the reading's distance from the boundary, which the best fit holds to 0 or more, χ² − χ²_min is (z − μ)² for z ≥ 0 and
-/// μ² − 2·μ·z below. It is at most q for z − μ from −(q + μ²)/(2μ), or −√q where that is above −μ, to √q.
+/// With z ~ N(μ, 1) and a best fit at 0 or more, χ² − χ²_min is (z − μ)² for z ≥ 0 and μ² − 2·μ·z below: at
+/// most q for z − μ from −(q + μ²)/(2μ), or −√q where that is above −μ, to √q.
 pub(crate) fn likelihood_bound(distance: f64) -> f64 {
     const STEP: f64 = 0.02;
     const STEPS: usize = 100;
@@ -516,7 +475,7 @@ mod tests {
 
     #[test]
     fn a_reading_of_nothing_but_the_product_leaves_the_place_open() {
-        // Every sensor reads the place times the force, and no sensor anything else.
+        // Every sensor reads the product of place and force.
         let channels = |x_m: f64, _: f64, out: &mut Vec<[f64; 2]>| {
             out.clear();
             out.extend([1.0, 2.0].map(|gain| [gain * 1e3 * 0.1 * 3.0, gain * 1e3 * x_m]));
@@ -540,7 +499,7 @@ mod tests {
 
     #[test]
     fn one_channel_may_be_anything_beyond_the_presses_where_the_others_tell_the_place() {
-        // Sensors that read the place, its square and so on, under a known force of 1 N at 0.5 m.
+        // Sensors that read powers of the place, at a known force of 1 N at 0.5 m.
         let not_excluded = |channels: i32, wrong: f64| {
             let channels = move |x_m: f64, _: f64, out: &mut Vec<[f64; 2]>| {
                 out.clear();

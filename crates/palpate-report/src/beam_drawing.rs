@@ -9,29 +9,23 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::{Beam, BeamSection, BeamSupportKind, SupportedBeam, Surface};
 
-/// Position of the drawn load, as a share of the length: off the middle, so that the shape is
-/// visibly asymmetric.
+/// Share of the length, off the middle, so that the shape is visibly asymmetric.
 const DRAWN_LOAD: f64 = 0.35;
-/// Candidate positions on a beam on any supports; the one with the largest bending is used.
+/// Candidate positions on other supports; the one with the largest bending is used.
 const DRAWN_LOADS: [f64; 5] = [DRAWN_LOAD, 0.2, 0.5, 0.65, 0.8];
 const SHAPE_STEPS: u32 = 200;
 
 const MARGIN: f64 = 40.0;
 const FONT_SIZE: f64 = 12.0;
-/// Middle of the force label, and the tail of the arrow.
 const LOAD_LABEL_Y: f64 = 20.0;
 const ARROW_TAIL_Y: f64 = 34.0;
 const BEAM_Y: f64 = 92.0;
 const BEAM_HALF_THICKNESS: f64 = 3.0;
-/// Half the drawn thickness of the thickest stretch of a stepped beam, and the least for any
-/// stretch.
 const STEPPED_HALF_THICKNESS: (f64, f64) = (5.5, 1.2);
-/// Room for the deflected shape.
 const DEFLECTION_ROOM: f64 = 56.0;
 const ROUND: [f64; 10] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
 const SUPPORT_HEIGHT: f64 = 22.0;
 const SUPPORT_HALF_WIDTH: f64 = 12.0;
-/// Height of the ground of springs.
 const SPRING_GROUND_Y: f64 = BEAM_Y + DEFLECTION_ROOM + 10.0;
 const PROBE_TOP: f64 = 164.0;
 const PROBE_HEIGHT: f64 = 18.0;
@@ -48,7 +42,6 @@ pub(super) fn beam_drawing(beam: &Beam, layout: &Layout, force_n: f64) -> (BeamD
     (BeamDrawing { supports, ..BeamDrawing::new(beam, layout, load, force_n) }, load)
 }
 
-/// Draws a beam on any supports, bent by `force_n`; also returns the position of the force.
 pub(super) fn supported_beam_drawing(
     beam: &SupportedBeam,
     layout: &Layout,
@@ -67,7 +60,7 @@ pub(super) fn supported_beam_drawing(
     (drawing, load)
 }
 
-/// Drawing of a loaded beam. Positions are from the left end and clamped to the ends.
+/// Positions are from the left end and clamped to the ends.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct BeamDrawing {
     pub length_mm: f64,
@@ -85,7 +78,6 @@ pub(super) struct BeamDrawing {
 }
 
 impl BeamDrawing {
-    /// A drawing without supports.
     fn new(beam: &dyn Surface, layout: &Layout, load: Position, force_n: f64) -> Self {
         // By reciprocity the bent shape is the influence function of the deflection under the load.
         let bent = beam.influence_function(SensorKind::Deflection, load);
@@ -105,8 +97,8 @@ impl BeamDrawing {
         }
     }
 
-    /// Returns a self-contained SVG document. It states the beam's length, the largest deflection,
-    /// both in mm, and the round factor of exaggeration.
+    /// The SVG states the beam's length, the largest deflection, both in mm, and the round factor
+    /// of exaggeration.
     pub fn svg(&self) -> String {
         let frame = Frame::new(self);
         let (numbers, number_rows) = number_labels(self, &frame);
@@ -167,7 +159,6 @@ impl Frame {
         })
     }
 
-    /// Centres a line of text, moved and cut so that it stays inside the image.
     fn centred(&self, text: &str, (middle, y): Point, size: f64, colour: Colour) -> Label {
         let text = text::fit(text, size, self.width - 16.0);
         let half = text::width(&text, size) / 2.0;
@@ -176,13 +167,11 @@ impl Frame {
     }
 }
 
-/// Returns the largest round factor not above `most`.
 fn round_below(most: f64) -> f64 {
     let decade = 10_f64.powf(most.log10().floor());
     ROUND.into_iter().rev().map(|factor| factor * decade).find(|&factor| factor <= most).unwrap_or(decade)
 }
 
-/// Numbers the sensors in as many rows as keep them apart; also returns the number of rows.
 fn number_labels(drawing: &BeamDrawing, frame: &Frame) -> (Vec<Label>, usize) {
     let mut rows = text::Rows::default();
     let label = |(index, &position_mm): (usize, &f64)| {
@@ -335,7 +324,7 @@ fn double_arrow(svg: &mut Svg, start: Point, end: Point, colour: Colour) {
     }
 }
 
-/// Draws a filled triangle with its tip at `tip`, along the unit vector `along`.
+/// Draws a triangle with its tip at `tip`, along the unit vector `along`.
 fn arrow_head(svg: &mut Svg, tip: Point, along: Point, length: f64, colour: Colour) {
     let back = (tip.0 - along.0 * length, tip.1 - along.1 * length);
     let aside = (-along.1 * length * 0.4, along.0 * length * 0.4);

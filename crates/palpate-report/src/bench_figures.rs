@@ -10,8 +10,7 @@ use super::{Axis, Chart, Mark, Marker, Series};
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::SurfaceSpec;
 
-/// Draws the surface bent by `force_n`, with its sensors; `None` if it cannot be drawn. `what` is
-/// its name.
+/// Draws the surface bent by `force_n`; `None` if it cannot be drawn.
 pub(super) fn bench_figure(
     what: &str,
     surface: &SurfaceSpec,
@@ -36,7 +35,6 @@ pub(super) fn bench_figure(
     Some(Figure::beam(format!("{what}: beam, supports, sensors and load"), &drawing, caption))
 }
 
-/// Chart of sensor positions: a row per layout, the first uppermost; a marker per kind of sensor.
 pub(super) fn sites_chart(layouts: &[(String, &Layout)], length_m: f64, marks: Vec<Mark>) -> Chart {
     let kinds = SensorKind::ALL.into_iter().enumerate().filter_map(|(colour, kind)| {
         let of_row = |(row, (_, layout)): (usize, &(String, &Layout))| -> Vec<(f64, f64)> {
@@ -53,7 +51,6 @@ pub(super) fn sites_chart(layouts: &[(String, &Layout)], length_m: f64, marks: V
         .with_marks(marks)
 }
 
-/// Axis of named rows, the first uppermost.
 pub(super) fn row_axis(names: &[&str]) -> Axis {
     let rows = names.len();
     let named = names.iter().enumerate().map(|(row, name)| (row_height(rows, row), (*name).to_owned()));

@@ -12,9 +12,9 @@ use palpate_estimators::evaluation::{ErrorSummary, Evaluation, limit_ratio, perc
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::surface::Extent;
 
-/// Number of stretches over which errors are averaged.
+/// Stretches over which errors are averaged.
 const STRETCHES: usize = 40;
-/// Greatest number of maps; further estimators are in the table only.
+/// Further estimators are in the table only.
 const MOST_MAPS: usize = 9;
 
 /// Contents of a comparison's report.
@@ -75,7 +75,6 @@ impl ComparisonReport<'_> {
         }
     }
 
-    /// Estimators with an evaluation, and their summaries.
     fn tried(&self) -> impl Iterator<Item = (&Comparison, &Evaluation, ErrorSummary)> {
         self.comparisons.iter().filter_map(|comparison| {
             let evaluation = &comparison.tried.evaluation;

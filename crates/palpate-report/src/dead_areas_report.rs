@@ -31,7 +31,6 @@ struct DeadAreasReport<'a> {
 }
 
 impl DeadAreasReport<'_> {
-    /// Pairs of sensing and estimator, in order of appearance.
     fn arms(&self) -> Vec<(&str, &'static str)> {
         let mut arms: Vec<(&str, &'static str)> = Vec::new();
         for row in &self.findings.rows {

@@ -1,4 +1,4 @@
-//! Report of a sensor design: layouts by several methods, with equal scores.
+//! Report of a sensor design: layouts by several methods and their scores.
 
 use maud::{Markup, html};
 
@@ -19,7 +19,6 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::LimitCurve;
 use palpate_mechanics::surface::Extent;
 
-/// Approximate number of cells of a map, and the least and greatest number along a side.
 const CELLS: f64 = 1600.0;
 const CELLS_A_SIDE: std::ops::RangeInclusive<usize> = 5..=160;
 
@@ -174,7 +173,6 @@ impl<'a> SensorDesignReport<'a> {
         Figure::chart(&chart, html! { "The sensors of every layout, a row each." })
     }
 
-    /// Limit along the surface for the even and the best layout.
     fn limit_figure(&self) -> Option<Figure> {
         let (even, best) = (self.even(), self.best()?);
         let name = |designed: &Designed| format!("limit, {} layout", designed.method.name());

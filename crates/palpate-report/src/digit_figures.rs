@@ -13,18 +13,15 @@ use palpate_mechanics::limit::{CramerRaoBound, Force, LimitCurve};
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::{Digit, ForceDirection};
 
-/// Drawn contacts, as shares of the length.
+/// Shares of the length.
 const DRAWN_CONTACTS: [f64; 3] = [0.5, 0.75, 1.0];
-/// Contacts for the linear theory, as shares of the length: away from the tip, which an estimate
-/// cannot pass.
+/// Shares of the length, away from the tip, which an estimate cannot pass.
 const JUDGED_CONTACTS: [f64; 3] = [0.45, 0.6, 0.8];
 const SHAPE_STEPS: u32 = 120;
-/// Number of forces of a curve, from a hundredth of the largest load to all of it.
 const FORCES: u32 = 60;
-/// Margin around the finger, as a share of its length.
 const MARGIN: f64 = 0.06;
 
-/// Draws the straight finger and its shape under `force_n` at three places, x and y to one scale.
+/// Draws the straight finger and its shape under `force_n` at three places, to scale.
 pub(super) fn shapes_figure(what: &str, digit: &Digit, layout: &Layout, force_n: f64) -> Figure {
     let l = digit.length_m();
     let points = |contact: Contact| {
@@ -73,8 +70,8 @@ pub(super) fn force_limit_figure(unknown: &LimitCurve) -> Figure {
     Figure::chart(&chart, caption)
 }
 
-/// Errors of the linear theory in position and force on readings without noise, relative to the
-/// exact limit. Empty if no estimator suits the bench.
+/// Errors of the linear theory without noise, relative to the exact limit; empty if no estimator
+/// suits the bench.
 pub(super) fn linear_theory_figures(setup: &Setup, limit: &CramerRaoBound, digit: &Digit) -> Vec<Figure> {
     let Some(theory) = LinearTheory::new(setup, digit) else { return Vec::new() };
     let at_limit = |contact: Contact| {

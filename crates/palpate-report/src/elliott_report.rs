@@ -34,7 +34,6 @@ impl ElliottReport<'_> {
         self.findings.rows.iter().find(|row| row.chain == chain)
     }
 
-    /// Chains on components, with the number of components.
     fn by_components(&self) -> impl Iterator<Item = (f64, &ChainRow)> {
         self.findings.rows.iter().filter_map(|row| match row.chain {
             Chain::Components(count) => Some((count as f64, row)),
@@ -118,7 +117,7 @@ impl ElliottReport<'_> {
         Series::error_bars(label, colour, points, Marker::Circle)
     }
 
-    /// Lines of the chains that do not depend on the number of components.
+    /// Chains that do not depend on the number of components.
     fn across(&self, error: fn(&ChainRow) -> Option<Quantiles>) -> impl Iterator<Item = Series> {
         let chains = [
             (Chain::Readings, "network on all readings", 1),

@@ -7,13 +7,12 @@ use palpate_estimators::setup::Setup;
 use palpate_mechanics::limit::{Bound, CramerRaoBound, Force, LimitCurve, LimitError};
 use palpate_mechanics::sensing::{Layout, NoiseError, Sensor, SensorKind};
 
-/// Noise of a common displacement sensor, as in `examples/paper.toml`. The founding paper's
-/// readings have no noise, and without noise there is no limit.
+/// Noise of a common displacement sensor, as in `examples/paper.toml`: without noise, as in the
+/// founding paper, there is no limit.
 const ASSUMED_NOISE_M: f64 = 5e-6;
-/// Beginning of the line's name in a legend.
 const LABEL: &str = "limit";
 
-/// Returns a line of medians; with `with_band`, also a band from the 5th to the 95th percentile.
+/// Median line, optionally with a band from the 5th to the 95th percentile.
 pub(super) fn banded(label: &str, colour: usize, along: &[(f64, Quantiles)], with_band: bool) -> Vec<Series> {
     let line = Series::line(label, colour, along.iter().map(|&(x, spread)| (x, spread.median)).collect());
     let band = along.iter().map(|&(x, spread)| BandPoint { x, low: spread.p05, high: spread.p95 });
@@ -25,13 +24,13 @@ pub(super) fn tolerance_mark(tolerance_m: f64) -> Mark {
     Mark::HorizontalLine { y: tolerance_m * 1e3, label: format!("tolerance, {} mm", mm(tolerance_m)) }
 }
 
-/// Mean error of the best unbiased estimator along the surface, in mm, dashed in black. `None` for
-/// a surface without a model, sensors without noise, or an unknown force.
+/// Mean error of the best unbiased estimator, in mm. `None` for a surface without a model, sensors
+/// without noise, or an unknown force.
 pub(super) fn limit_line(setup: &Setup) -> Option<Series> {
     Some(line(&curve(setup, setup.layout()).ok()?, 6, format!("{LABEL}: what physics allows")))
 }
 
-/// [`limit_line`]; deflection sensors without noise get an assumed noise, which the legend states.
+/// [`limit_line`], with an assumed noise for deflection sensors without noise.
 pub(super) fn limit_line_or_assumed(setup: &Setup) -> Option<Series> {
     let clean = |sensor: &Sensor| sensor.kind == SensorKind::Deflection && sensor.channel.noise_sd == 0.0;
     match curve(setup, setup.layout()) {
@@ -45,15 +44,13 @@ pub(super) fn limit_line_or_assumed(setup: &Setup) -> Option<Series> {
     }
 }
 
-/// Mean error of the best unbiased estimator of an arm, in mm, dashed; `None` without a limit. The
-/// knowledge of the force is that of the locator.
+/// Mean error of the best unbiased estimator of an arm, in mm; `None` without a limit.
 pub(super) fn limit_line_of_arm(setup: &Setup, force_n: f64, colour: usize, label: &str) -> Option<Series> {
     let limit = setup.cramer_rao_bound().ok()?;
     let force = setup.force();
     Some(line(&LimitCurve::over_surface(&limit, force_n, force).ok()?, colour, label.to_owned()))
 }
 
-/// Remark for the caption of a chart with the limit; else empty.
 pub(super) fn limit_in_words(chart: &Chart) -> String {
     let Some(line) = chart.series.iter().find(|series| series.label.starts_with(LABEL)) else {
         return String::new();
@@ -80,7 +77,7 @@ fn line(curve: &LimitCurve, colour: usize, label: String) -> Series {
     Series::dashes(label, colour, in_milli(curve.by_x(Bound::mean_error_m)))
 }
 
-/// Converts coordinates to thousandths: m to mm, N to mN.
+/// Converts m to mm, N to mN.
 pub(super) fn in_milli(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     points.into_iter().map(|(x, y)| (x * 1e3, y * 1e3)).collect()
 }

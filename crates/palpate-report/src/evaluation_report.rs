@@ -18,7 +18,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_rig::Rig;
 
-/// Greatest number of positions drawn as markers; more are drawn as a line.
+/// More positions are drawn as a line.
 const MOST_MARKERS: usize = 80;
 
 /// Contents of an evaluation's report.
@@ -211,8 +211,7 @@ impl EvaluationReport<'_> {
         Axis::linear(label).from_to(0.0, self.evaluation.extent.length_m() * 1e3)
     }
 
-    /// Estimated against true position: a marker per reading, or for many readings medians with a
-    /// band.
+    /// A marker per reading, or for many readings medians with a band.
     fn estimates(
         &self,
         label: &str,

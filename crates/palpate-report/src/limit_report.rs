@@ -18,9 +18,8 @@ use palpate_mechanics::limit::{CramerRaoBound, Force, LimitCurve, LimitWarning};
 use palpate_mechanics::sensing::{Sensor, SensorKind};
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
 
-/// Limits beyond this many lengths of the surface are cut off: an error cannot exceed the surface.
+/// Limits are cut off at this many lengths of the surface.
 const MOST_LENGTHS: f64 = 10.0;
-/// Approximate number of cells of a map, and the least and greatest number along a side.
 const CELLS: f64 = 2000.0;
 const CELLS_A_SIDE: std::ops::RangeInclusive<usize> = 5..=200;
 
@@ -167,8 +166,7 @@ impl LimitReport<'_> {
         Figure::chart(&chart, caption)
     }
 
-    /// Zones of the warnings, and with `beyond` a line at the length of the surface, which means
-    /// "anywhere".
+    /// Zones of the warnings; with `beyond`, also a line at the length of the surface.
     fn marks(&self, beyond: bool) -> Vec<Mark> {
         let length_m = self.known.extent.length_m();
         let label = format!("length of the surface, {} mm", mm(length_m));
@@ -220,7 +218,6 @@ impl LimitReport<'_> {
         Figure::map(&map, caption)
     }
 
-    /// Figures for a digit: force limit, and range of the linear theory.
     fn digit_figures(&self) -> Vec<Figure> {
         let SurfaceSpec::Digit(digit) = self.setup.surface() else { return Vec::new() };
         let force_limit = force_limit_figure(self.unknown);
@@ -337,7 +334,6 @@ fn limit_axis(extremes: Extremes, length_mm: f64) -> Axis {
     }
 }
 
-/// Adds a capital at the beginning and a full stop at the end.
 fn sentence(words: &str) -> String {
     let mut characters = words.chars();
     let first = characters.next().map(|first| first.to_uppercase().to_string()).unwrap_or_default();

@@ -13,12 +13,11 @@ use palpate_mechanics::limit::{Bound, CramerRaoBound, Force};
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::Extent;
 
-/// Greatest useful number of cells along a side.
 const MOST_SIDE: usize = 60;
-/// Ratio of cells to positions above which most cells would be empty.
+/// Cells per position above which most cells would be empty.
 const SPARSE: usize = 4;
 
-/// Maps of the median errors of locators and of the limit, on the scale of the errors.
+/// Median errors of locators, and the limit, on the scale of the errors.
 pub(super) fn error_map(
     setup: &Setup,
     title: &str,
@@ -56,7 +55,7 @@ pub(super) fn error_map(
     Figure::map(&map, caption)
 }
 
-/// Returns one cell per position for positions on a grid, else larger cells.
+/// One cell per position for positions on a grid, else larger cells.
 fn error_cells(evaluations: &[(&str, &Evaluation)], extent: Extent) -> Cells {
     let located = evaluations.iter().flat_map(|(_, evaluation)| &evaluation.located);
     let mut places: Vec<Position> = located.map(|located| located.truth).collect();
@@ -77,7 +76,7 @@ fn error_cells(evaluations: &[(&str, &Evaluation)], extent: Extent) -> Cells {
     Cells::nearly_square(extent, 0.5 * places.len() as f64, 2..=MOST_SIDE)
 }
 
-/// Figure of the bound at the middle of each cell, in mm; NaN without a bound.
+/// Figure of the bound in mm; NaN without a bound.
 pub(super) fn limits_mm(
     limit: &CramerRaoBound,
     cells: &Cells,
@@ -88,7 +87,6 @@ pub(super) fn limits_mm(
     cells.centres().map(|at| bound(at).map_or(f64::NAN, |bound| figure(&bound) * 1e3)).collect()
 }
 
-/// Positions of the sensors, in mm, without raw channels.
 pub(super) fn sensors_mm(layout: &Layout) -> Vec<(f64, f64)> {
     let placed = layout.sensors().iter().filter(|sensor| sensor.kind != SensorKind::Raw);
     placed.map(|sensor| in_mm(sensor.position)).collect()
@@ -98,15 +96,14 @@ pub(super) fn in_mm(position: Position) -> (f64, f64) {
     (position.x_m * 1e3, position.y_m * 1e3)
 }
 
-/// A design on a plane: name, a value for each cell, and dots.
 pub(super) struct Designed<'a> {
     pub name: &'a str,
     pub values: Vec<f64>,
     pub dots_mm: Vec<(f64, f64)>,
 }
 
-/// Draws a map per design with one colour scale, which ends at the 95th percentile of all values.
-/// `title` gets the design's name; `caption` also gets the end of the scale.
+/// One map per design; the colour scale ends at the 95th percentile. `title` gets the design's
+/// name, `caption` also the end of the scale.
 pub(super) fn compared_maps(
     cells: Cells,
     label: &str,

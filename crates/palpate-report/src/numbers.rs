@@ -5,11 +5,9 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Dimension, Quantity, format_count};
 
-/// Placeholder for a missing number.
 pub(crate) const NOTHING: &str = "–";
 
-/// About three significant digits: "63.5", "2.46", "−0.044", "1,250"; "–" for a value that is not
-/// finite.
+/// Three significant digits: "63.5", "−0.044", "1,250"; "–" for a value that is not finite.
 pub(crate) fn number(value: f64) -> String {
     let size = value.abs();
     if !value.is_finite() {
@@ -34,12 +32,12 @@ fn signed(value: f64, size: String) -> String {
     if value < 0.0 { format!("−{size}") } else { size }
 }
 
-/// Fixed number of decimals: "−1.3784".
+/// "−1.3784"
 pub(crate) fn decimals(value: f64, count: usize) -> String {
     signed(value, format!("{:.count$}", value.abs()))
 }
 
-/// SI value with its unit: "5 µm" for "5 um" in files.
+/// "5 µm" for "5 um" in files.
 pub(crate) fn quantity(value: f64, dimension: Dimension) -> String {
     let text = Quantity { value, dimension }.to_string();
     match text.split_once(" u") {
@@ -49,7 +47,7 @@ pub(crate) fn quantity(value: f64, dimension: Dimension) -> String {
     }
 }
 
-/// Whole number: "26,850".
+/// "26,850"
 pub(crate) fn whole(value: f64) -> String {
     if !value.is_finite() {
         return NOTHING.to_owned();
@@ -58,46 +56,46 @@ pub(crate) fn whole(value: f64) -> String {
     signed(rounded, format_count(rounded.abs() as u64))
 }
 
-/// Unrounded number: "3.6", "26,850".
+/// "3.6", "26,850"
 pub(crate) fn as_written(value: f64) -> String {
     if value.abs() >= 1e3 { whole(value) } else { format!("{value}") }
 }
 
-/// Length in millimetres without unit, at most two decimals: "33.33", "20".
+/// At most two decimals: "33.33", "20".
 pub(crate) fn mm(length_m: f64) -> String {
     let text = format!("{:.2}", length_m * 1e3);
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// Position in millimetres: "50", or "50, 20" on a plane.
+/// "50", or "50, 20" on a plane.
 pub(crate) fn place(position: Position, extent: Extent) -> String {
     extent.coordinates_m(position).map(mm).collect::<Vec<_>>().join(", ")
 }
 
-/// Portion of the surface: "20–380 mm".
+/// "20–380 mm"
 pub(crate) fn stretch(portion: Portion) -> String {
     format!("{}–{} mm", mm(portion.from_m), mm(portion.to_m))
 }
 
-/// Number in the form of a rig file: "3", "200", "0.25".
+/// As in a rig file: "3", "200", "0.25".
 pub(crate) fn stated(value: f64) -> String {
     let text = format!("{value:.4}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// Median with 5th and 95th percentile: "2.38 (2.26–2.73)"; the median alone if all three read the
-/// same.
+/// Median with 5th and 95th percentile: "2.38 (2.26–2.73)"; the median alone if all three read
+/// alike.
 pub(crate) fn spread(spread: Quantiles, shown: fn(f64) -> String) -> String {
     let [median, low, high] = [spread.median, spread.p05, spread.p95].map(shown);
     if low == median && high == median { median } else { format!("{median} ({low}–{high})") }
 }
 
-/// Count with its noun: "1 seed", "1,200 networks".
+/// "1 seed", "1,200 networks"
 pub(crate) fn counted(count: usize, one: &str, many: &str) -> String {
     format!("{} {}", whole(count as f64), if count == 1 { one } else { many })
 }
 
-/// List in words: "C1, C2 and C5".
+/// "C1, C2 and C5"
 pub(crate) fn listed<T: AsRef<str>>(items: &[T]) -> String {
     match items {
         [] => String::new(),

@@ -18,7 +18,6 @@ pub struct ReportFile {
     pub bytes: Vec<u8>,
 }
 
-/// A page with numbered figures and tables.
 pub(crate) struct Page {
     title: String,
     lead: Markup,
@@ -27,7 +26,7 @@ pub(crate) struct Page {
     source: Markup,
 }
 
-/// A part of a page with a heading and an anchor.
+/// Part of a page with a heading and an anchor.
 pub(crate) struct Section {
     id: &'static str,
     heading: &'static str,
@@ -60,7 +59,6 @@ impl Section {
         figures.into_iter().fold(self, Self::figure)
     }
 
-    /// Adds a table, unless it has no rows.
     pub fn table(self, table: Table) -> Self {
         if table.rows.is_empty() { self } else { self.block(Block::Table(table)) }
     }
@@ -75,14 +73,12 @@ pub(crate) struct Figure {
     /// Alternative text for readers who cannot see the figure.
     alternative: String,
     svg: String,
-    /// Drawing for a phone's screen.
+    /// Drawing for a phone's screen, 360 pixels wide.
     narrow_svg: String,
     caption: Markup,
 }
 
-/// Width of a drawing on a phone, in pixels.
 const NARROW_PX: u32 = 360;
-/// Greatest height of a chart on a phone.
 const NARROW_HEIGHT_PX: u32 = 420;
 
 impl Figure {
@@ -106,7 +102,7 @@ impl Figure {
         Self::new(alternative, [drawing, &narrow].map(BeamDrawing::svg), caption)
     }
 
-    /// Returns HTML with both drawings. They contain no ids, which could collide.
+    /// The drawings contain no ids, which could collide.
     fn markup(&self, number: usize) -> Markup {
         let [wide, narrow] =
             [("wide-drawing", &self.svg), ("narrow", &self.narrow_svg)].map(|(class, svg)| {
@@ -123,16 +119,15 @@ impl Figure {
     }
 }
 
-/// A table with its caption.
 pub(crate) struct Table {
     caption: Markup,
     columns: Vec<Column>,
-    /// Cells by row; the first cell of a row is its heading.
+    /// The first cell of a row is its heading.
     rows: Vec<Vec<Markup>>,
 }
 
 impl Table {
-    /// Returns a table with a row per item; the first column heads the rows.
+    /// A row per item; the first column heads the rows.
     pub fn from_rows<R>(rows: impl IntoIterator<Item = R>) -> Columns<R> {
         let rows: Vec<R> = rows.into_iter().collect();
         Columns { cells: rows.iter().map(|_| Vec::new()).collect(), columns: Vec::new(), rows }
@@ -166,7 +161,7 @@ pub(crate) struct Column {
     class: &'static str,
 }
 
-/// A table that is built by columns, with a cell for every row.
+/// A table that is built by columns.
 pub(crate) struct Columns<R> {
     rows: Vec<R>,
     columns: Vec<Column>,
@@ -174,37 +169,34 @@ pub(crate) struct Columns<R> {
 }
 
 impl<R> Columns<R> {
-    /// Column of words.
+    /// Words.
     pub fn words<T: AsRef<str>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.column("text", heading, |row| text(cell(row)))
     }
 
-    /// Column of words without line breaks.
+    /// Words without line breaks.
     pub fn short<T: AsRef<str>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.column("short", heading, |row| text(cell(row)))
     }
 
-    /// Wide column of sentences.
     pub fn wide<T: AsRef<str>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.column("wide", heading, |row| text(cell(row)))
     }
 
-    /// Column of numbers given as text.
     pub fn numeric<T: AsRef<str>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.column("number", heading, |row| text(cell(row)))
     }
 
-    /// Column of numbers with about three digits; a dash for a missing one.
+    /// About three digits; a dash for a missing number.
     pub fn number<T: Into<Option<f64>>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.column("number", heading, |row| text(number(cell(row).into().unwrap_or(f64::NAN))))
     }
 
-    /// Column of lengths in metres, shown in millimetres; a dash for a missing one.
+    /// Metres, shown in millimetres; a dash for a missing length.
     pub fn mm<T: Into<Option<f64>>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.number(heading, |row| cell(row).into().map(|length_m| length_m * 1e3))
     }
 
-    /// Column of cells with a CSS class.
     pub fn column(
         mut self,
         class: &'static str,
@@ -225,7 +217,6 @@ pub(crate) fn text(text: impl AsRef<str>) -> Markup {
     html! { (text.as_ref()) }
 }
 
-/// Good or bad verdict in words.
 pub(crate) fn verdict(good: bool, yes: &str, no: &str) -> Markup {
     if good {
         html! { span.yes { "✓ " (yes) } }
@@ -234,7 +225,6 @@ pub(crate) fn verdict(good: bool, yes: &str, no: &str) -> Markup {
     }
 }
 
-/// Style that replaces the colours of drawings on a dark page.
 fn dark_drawings() -> String {
     let rule = |(light, dark): &(Colour, Colour)| {
         format!(
@@ -254,12 +244,10 @@ impl Page {
         Self { lead, ..self }
     }
 
-    /// Adds the source of the page, after "Made by palpate 1.2.3".
     pub fn with_source(self, source: Markup) -> Self {
         Self { source, ..self }
     }
 
-    /// Returns the page and its figures.
     pub fn files(self) -> Vec<ReportFile> {
         let (mut figures, mut tables) = (0, 0);
         let mut drawings = Vec::new();

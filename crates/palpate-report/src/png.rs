@@ -5,9 +5,7 @@ use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{self, fontdb};
 use std::sync::{Arc, LazyLock};
 
-/// Font that replaces every generic family.
 const FONT_FAMILY: &str = "Noto Sans";
-/// Pixels of a PNG copy for each pixel of its SVG.
 const COPY_SCALE: f32 = 2.0;
 /// Longest side of a PNG in pixels.
 const MAX_SIDE_PX: u32 = 16_384;
@@ -80,7 +78,6 @@ pub fn svg_to_png(svg: &str, scale: f32) -> Result<Vec<u8>, PngError> {
     pixels.encode_png().map_err(|error| PngError::Encoding(Box::new(error)))
 }
 
-/// Parses a document, with all texts in the built-in font.
 pub(crate) fn parse(svg: &str) -> Result<usvg::Tree, usvg::Error> {
     let options = usvg::Options {
         font_family: FONT_FAMILY.to_owned(),

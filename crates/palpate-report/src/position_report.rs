@@ -54,7 +54,6 @@ impl<'a> PositionDesignReport<'a> {
         best_placed(self.placed)
     }
 
-    /// Even and best arrangement, if they differ.
     fn compared(&self) -> Vec<&'a Placed> {
         let best = self.best().filter(|best| best.placement != Placement::Even);
         self.even().into_iter().chain(best).collect()
@@ -106,7 +105,6 @@ impl<'a> PositionDesignReport<'a> {
             .caption(html! { "Where to press." })
     }
 
-    /// Positions of every arrangement, a row each, the first uppermost.
     fn rows_figure(&self) -> Figure {
         let rows = self.placed.len();
         let series = self.placed.iter().enumerate().map(|(row, placed)| {
@@ -120,7 +118,6 @@ impl<'a> PositionDesignReport<'a> {
         Figure::chart(&chart, html! { "The training positions of every arrangement, a row each." })
     }
 
-    /// Mean error at each contact, of the even and the best arrangement.
     fn errors_figure(&self) -> Figure {
         let contacts = &self.problem.contacts().positions;
         let points = |placed: &Placed| {
@@ -141,7 +138,6 @@ impl<'a> PositionDesignReport<'a> {
         Figure::chart(&chart, html! { "The mean error at each contact over all verifying calibrations." })
     }
 
-    /// Maps of the error with the even and the best arrangement, on one scale.
     fn maps(&self) -> Vec<Figure> {
         let contacts = &self.problem.contacts().positions;
         let columns = contacts.iter().take_while(|at| at.y_m == contacts[0].y_m).count().max(1);

@@ -10,10 +10,10 @@ use palpate_estimators::estimator::{ForceBounds, LoadProfile, Patch, PatchLimit,
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::{Extent, UniformLoad};
 
-/// Drawn averaging kernels, as shares of the length, and on a plane also of the width.
+/// Shares of the length, and on a plane also of the width.
 const KERNEL_PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 const KERNEL_PLACES_ON_A_PLANE: [[f64; 2]; 3] = [[0.5, 0.5], [0.25, 0.25], [0.1, 0.5]];
-/// Factor from N/m to N/mm, and from Pa to kPa.
+/// From N/m to N/mm, and from Pa to kPa.
 const PER_THOUSAND: f64 = 1e-3;
 
 /// Contents of a profile's report.
@@ -94,7 +94,6 @@ impl<'a> ProfileReport<'a> {
         }
     }
 
-    /// Middle of each cell of a line in mm, with a figure of the cell.
     fn by_cell(&self, figure: impl Fn(usize) -> f64) -> Vec<(f64, f64)> {
         let centres = self.profile.cells.centres().enumerate();
         centres.map(|(cell, centre)| (centre.x_m * 1e3, figure(cell))).collect()
@@ -139,7 +138,6 @@ impl<'a> ProfileReport<'a> {
         Figure::chart(&chart, caption)
     }
 
-    /// Simulated loads in N/mm, as a step function.
     fn truth_steps(&self) -> Vec<(f64, f64)> {
         let mut loads = self.truth.to_vec();
         loads.sort_by(|a, b| a.from().x_m.total_cmp(&b.from().x_m));
@@ -236,7 +234,6 @@ impl<'a> ProfileReport<'a> {
         Figure::map(&self.map("Averaging kernels", "share", panels), caption)
     }
 
-    /// Residuals: along a line by place, on a plane by number.
     fn residual_figure(&self) -> Figure {
         let mut kinds = self.layout.kinds();
         kinds.dedup();
@@ -326,12 +323,11 @@ impl<'a> ProfileReport<'a> {
     }
 }
 
-/// Interval in millimetres, to a tenth.
 fn interval_mm((from_m, to_m): (f64, f64)) -> String {
     format!("{}–{}", tenths_mm(from_m), tenths_mm(to_m))
 }
 
-/// Force interval in newtons; the upper end may be infinite.
+/// The upper end may be infinite.
 fn interval_n((low_n, high_n): (f64, f64)) -> String {
     if high_n.is_finite() {
         format!("{}–{}", number(low_n), number(high_n))

@@ -13,11 +13,10 @@ use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::Extent;
 use palpate_studies::{Arm, ArmOutcome, ArmResults, PreparedStudy, RunFacts, StudyResults};
 
-/// Greatest number of arms that a table alone distinguishes.
+/// Arms that a table alone distinguishes.
 const FEW_ARMS: usize = 3;
-/// Greatest number of overlapping bands in a figure.
 const MOST_BANDS: usize = 2;
-/// Distance between neighbouring markers of an arm, in rows.
+/// In rows.
 const BESIDE: f64 = 0.22;
 
 /// Contents of a study's report.
@@ -89,7 +88,7 @@ pub(super) fn longest(report: &StudyReport) -> Option<Markup> {
     })
 }
 
-/// Average errors of all arms, a row each, if there are more than a few.
+/// Average errors of the arms; `None` for a few arms.
 fn overview(report: &StudyReport) -> Option<Figure> {
     let arms = &report.results.arms;
     if arms.len() <= FEW_ARMS {
@@ -130,8 +129,7 @@ struct Compared {
     limit: fn(&ArmResults) -> Option<f64>,
 }
 
-/// Errors over all positions and in the first portion, or between training positions and beyond
-/// them.
+/// Errors over all positions and in the first portion, or between and beyond training positions.
 fn compared(report: &StudyReport) -> Vec<Compared> {
     if report.study.judging().training_span {
         let span = |label: &str, error: fn(&ArmResults) -> Option<Quantiles>| Compared {
@@ -159,7 +157,6 @@ fn compared(report: &StudyReport) -> Vec<Compared> {
     all.into_iter().chain(first).collect()
 }
 
-/// Distinct layouts, with their arms.
 fn layouts<'a>(report: &StudyReport<'a>) -> Vec<(Vec<&'a str>, &'a Layout)> {
     let mut layouts: Vec<(Vec<&str>, &Layout)> = Vec::new();
     let places = |layout: &Layout| -> Vec<_> {
@@ -193,7 +190,6 @@ fn layouts_table(layouts: &[(Vec<&str>, &Layout)], extent: Extent) -> Table {
         .caption(html! { "Where the sensors of every arm sit." })
 }
 
-/// Errors along the surface, in a figure per shared title and per arm without a title.
 fn along_the_surface(report: &StudyReport) -> Vec<Figure> {
     let mut groups: Vec<(Option<&str>, Vec<&Arm>)> = Vec::new();
     let run = report.results.arms.iter().filter_map(|arm| report.arm(&arm.name));
@@ -269,7 +265,6 @@ pub(crate) struct ArmLine<'a> {
 }
 
 impl<'a> StudyReport<'a> {
-    /// Outcome of an arm with at least one fit.
     pub(crate) fn outcome(&self, arm: &str) -> Option<&'a ArmOutcome> {
         self.outcomes.iter().find(|outcome| outcome.name == arm && !outcome.fits.is_empty())
     }
@@ -278,8 +273,7 @@ impl<'a> StudyReport<'a> {
         self.study.study.arms.iter().find(|arm| arm.name == name)
     }
 
-    /// Noun for the fits, singular and plural: networks, or locators if some arm has another
-    /// estimator.
+    /// Networks, or locators if some arm has another estimator; singular and plural.
     pub(crate) fn noun(&self) -> [&'static str; 2] {
         let trained = self.results.arms.iter().all(|arm| arm.epochs.is_some());
         if trained { ["network", "networks"] } else { ["locator", "locators"] }
@@ -300,13 +294,11 @@ impl<'a> StudyReport<'a> {
         }
     }
 
-    /// First and last evaluated position, in metres.
     pub(crate) fn judged_portion(&self) -> Option<Portion> {
         let positions = &self.study.judging().positions;
         Some(Portion { from_m: positions.first()?.x_m, to_m: positions.last()?.x_m })
     }
 
-    /// Extent of the first arm, if it is a line.
     fn extent(&self) -> Option<Extent> {
         Some(self.study.study.arms.first()?.rig.setup.surface().extent().along_x())
     }
@@ -329,7 +321,7 @@ impl<'a> StudyReport<'a> {
     }
 }
 
-/// Quantiles of a figure over an arm's seeds, by position in mm.
+/// Quantiles over an arm's seeds, by position in mm.
 pub(crate) fn spread_by_position(
     outcome: &ArmOutcome,
     figure: impl Fn(&Located) -> f64,
@@ -337,15 +329,14 @@ pub(crate) fn spread_by_position(
     outcome.by_position(figure).into_iter().map(|(x_m, spread)| (x_m * 1e3, spread)).collect()
 }
 
-/// Location error of an arm in mm along the surface, with an optional band over several seeds;
-/// empty without a fit.
+/// Location errors in mm; empty without a fit.
 pub(crate) fn errors(report: &StudyReport, line: &ArmLine, with_band: bool) -> Vec<Series> {
     let Some(outcome) = report.outcome(line.arm) else { return Vec::new() };
     let along = spread_by_position(outcome, |located| located.error_m() * 1e3);
     banded(line.label, line.colour, &along, with_band && outcome.fits.len() > 1)
 }
 
-/// Chart of location errors in mm with the limit of the first arm; `None` without a fit.
+/// Location errors in mm with the limit of the first arm; `None` without a fit.
 pub(crate) fn error_chart(report: &StudyReport, title: &str, arms: &[ArmLine]) -> Option<Chart> {
     let mut series: Vec<Series> = arms.iter().flat_map(|line| errors(report, line, true)).collect();
     if series.is_empty() {
@@ -355,7 +346,6 @@ pub(crate) fn error_chart(report: &StudyReport, title: &str, arms: &[ArmLine]) -
     Some(chart_of_errors(report, title, series))
 }
 
-/// Chart of location errors in mm, on a logarithmic axis, with the tolerance.
 pub(crate) fn chart_of_errors(report: &StudyReport, title: &str, series: Vec<Series>) -> Chart {
     let length_mm = report.length_m() * 1e3;
     let x = Axis::linear("load position, mm").from_to(0.0, length_mm);
@@ -363,10 +353,10 @@ pub(crate) fn chart_of_errors(report: &StudyReport, title: &str, series: Vec<Ser
     Chart::new(title, x, y, series).with_marks(vec![tolerance_mark(report.study.judging().tolerance_m)])
 }
 
-/// Low end of the axis of errors: errors cross zero, which a logarithmic axis cannot show.
+/// Errors cross zero, which a logarithmic axis cannot show.
 const LEAST_ERROR_MM: f64 = 0.05;
 
-/// Table of every arm, without empty columns.
+/// Empty columns are omitted.
 pub(crate) fn arms_table(report: &StudyReport) -> Table {
     let arms = &report.results.arms;
     let mut table = Table::from_rows(arms.iter().enumerate()).short("arm", |(_, arm)| arm.name.clone());
@@ -382,7 +372,6 @@ pub(crate) fn arms_table(report: &StudyReport) -> Table {
     })
 }
 
-/// A column with a cell for each arm; `None` for an empty one.
 struct ArmColumn {
     heading: String,
     cells: Vec<Option<Markup>>,
@@ -444,7 +433,7 @@ fn arm_columns(report: &StudyReport) -> Vec<ArmColumn> {
     columns
 }
 
-/// Median, and beneath it the range, if it differs.
+/// Median, and beneath it the range.
 fn stacked(spread: Quantiles, shown: fn(f64) -> String) -> Markup {
     let [median, low, high] = [spread.median, spread.p05, spread.p95].map(shown);
     html! { (median) @if low != median || high != median { span.range { (low) "–" (high) } } }

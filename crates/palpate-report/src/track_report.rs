@@ -11,12 +11,11 @@ use palpate_estimators::track_errors::{SpeedErrors, TrackErrors, tracked_of};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 
-/// Greatest number of drawn single estimates; more would cover the track.
+/// More single estimates would cover the track.
 const MOST_POINTS: usize = 60;
-/// Greatest number of points of a line; more cannot be distinguished.
+/// More points cannot be distinguished.
 const MOST_OF_LINE: usize = 2000;
-/// Approximate width of the plot area, and height of the parts above and below it: a plane is drawn
-/// to scale.
+/// Approximate width of the plot area, and height of the parts above and below it.
 const PLOT_WIDTH_PX: f64 = 630.0;
 const AROUND_PLOT_PX: f64 = 130.0;
 
@@ -120,7 +119,6 @@ impl TrackReport<'_> {
         Figure::chart(&chart, caption)
     }
 
-    /// A selection of the estimates by single readings.
     fn single_readings(&self, position: impl Fn(&Track) -> (f64, f64)) -> Series {
         let stride = self.tracks.len().div_ceil(MOST_POINTS).max(1);
         let every = if stride > 1 { format!(", every {stride}th") } else { String::new() };
@@ -128,7 +126,7 @@ impl TrackReport<'_> {
         Series::markers(format!("single readings{every}"), 4, points, Marker::Cross)
     }
 
-    /// Track minus true position, with its 95 % band; only the band if the truth is unknown.
+    /// Track minus truth with a 95 % band; only the band for an unknown truth.
     fn errors_figure(&self) -> Figure {
         let stride = self.tracks.len().div_ceil(MOST_OF_LINE).max(1);
         let mut series = Vec::new();
@@ -170,8 +168,7 @@ impl TrackReport<'_> {
         }
     }
 
-    /// Track and 95 % interval at reading `i` in mm, minus the truth, or the track if the truth is
-    /// unknown.
+    /// Track and 95 % interval in mm, minus the truth, or else minus the track.
     fn off_mm(&self, i: usize, coordinate: &Coordinate) -> Option<[f64; 3]> {
         let track = &self.tracks[i];
         let (tracked, truth) = match self.truths.get(i) {
@@ -250,12 +247,10 @@ struct Coordinate {
     across: bool,
 }
 
-/// Position of a contact; `None` if it does not touch.
 fn touching(contact: Option<&Contact>) -> Option<Position> {
     contact.filter(|contact| contact.force_n > 0.0).map(|contact| contact.position)
 }
 
-/// Name of one of two contacts; empty for a single contact.
 fn of_two(k: usize, report: &TrackReport) -> &'static str {
     match (report.most_contacts(), k) {
         (2.., 0) => " of the first",

@@ -23,8 +23,8 @@ from ._checks import check_type
 _MARKERS = {"deflection": "o", "raw": "o", "slope": "^", "strain": "s", "reaction": "x"}
 _COLOURS = {"deflection": 2, "raw": 2, "slope": 3, "strain": 4, "reaction": 5}
 _MOST_NUMBERED = 16
-# Shares of the length where a drawn force acts: on a beam the one that bends it most, off the middle so that the shape is askew; on a
-# digit all three of the second.
+# Positions of drawn forces, as shares of the length: on a beam the force with the largest deflection is drawn,
+# on a digit all of `_DRAWN_CONTACTS`.
 _DRAWN_LOADS = (0.35, 0.2, 0.5, 0.65, 0.8, 1.0)
 _DRAWN_CONTACTS = (0.5, 0.75, 1.0)
 
@@ -109,7 +109,7 @@ def layouts(layouts: Mapping[str, Setup] | SensorPlacement, *, ax: Axes | None =
         canvas.to_scale(first.length, first.width)
         for index, (name, one) in enumerate(layouts.items()):
             x, y = 1e3 * one.sensor_positions.T
-            # Rings of different sizes are seen where layouts share a place.
+            # Rings of different sizes stay visible where layouts share a position.
             size = canvas.marker_size * (1 + 0.7 * index)
             canvas.markers(x, y, index, name, markersize=size, markerfacecolor="none" if index else None)
         canvas.legend()
@@ -277,7 +277,7 @@ def _in_newtons(force: Quantity) -> str:
     return force if isinstance(force, str) else f"{force:g} N"
 
 
-# A spring from the surface down to the ground.
+# Symbol of a spring, from the surface down to the ground.
 _SPRING = Path([(0, 0), (0, -1), (-1, -1.5), (1, -2.5), (-1, -3.5), (0, -4), (0, -5), (-1.5, -5), (1.5, -5)])
 
 

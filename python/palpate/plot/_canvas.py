@@ -14,7 +14,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from .._results import Floats
 
-# The colours of palpate's reports: Okabe and Ito's, which people with colour blindness tell apart, and lighter ones on a dark ground.
+# Colours of palpate's reports: the palette of Okabe and Ito for colour-blind readers, and lighter ones for a dark background.
 _LIGHT_GROUND = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 _DARK_GROUND = ("#4090d8", "#ff863d", "#2fc79a", "#e39ac4", "#9edaff", "#ffc857")
 _SIZE = (4.5, 3.0)
@@ -144,7 +144,7 @@ class Canvas:
                 legend = self._legend(handles, labels, most)
             legend.set_in_layout(True)
         if self.ax.get_aspect() != "auto" and self._figure.get_layout_engine() is not None:
-            # Axes that are drawn to scale are where they belong after the second layout alone; the next drawing makes it.
+            # Axes that are drawn to scale need two layout passes: this is the first, the next drawing is the second.
             self._figure.draw_without_rendering()
 
     def _legend(self, handles: Any, labels: Any, columns: int) -> Legend:

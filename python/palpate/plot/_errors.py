@@ -20,7 +20,7 @@ from ._bench import sensor_dots
 from ._canvas import Canvas
 from ._checks import check_surface, check_type, named
 
-# Of more positions or estimates, markers would hide each other.
+# More markers would overlap.
 _MOST_MARKERS = 80
 _STRETCHES = 40
 _MEAN_OF_NORMAL = float(np.sqrt(2 / np.pi))

@@ -17,7 +17,7 @@ from ._bench import sensors
 from ._canvas import Canvas
 from ._checks import check_surface, check_type
 
-# √χ² of two coordinates that holds 95 % of a normal distribution.
+# Square root of the 95 % quantile of χ² with two degrees of freedom.
 _OF_95_OF_TWO = 2.447747
 _MARKERS = {"located": "o", "ambiguous": "D", "outside_model": "s", "outside_surface": "v"}
 
@@ -96,7 +96,7 @@ def _with_force(canvas: Canvas, estimates: Estimates, truth: Recording | None) -
         known = truth.touches & np.isfinite(truth.force)
         _truth(canvas, 1e3 * truth.x[known], truth.force[known])
     _by_status(canvas, x, force, estimates)
-    # Beside an end a region may reach far beyond any contact.
+    # Near an end a region may extend far beyond the contacts.
     strongest = np.nanmax(np.concatenate([force[seen], [0.0]]))
     canvas.ax.set_ylim(0, min(canvas.ax.get_ylim()[1], 3 * strongest) or None)
     canvas.labels("position, mm", "force, N")
@@ -140,7 +140,7 @@ def _ellipses(canvas: Canvas, x: Floats, y: Floats, covariances: Floats) -> None
         return
     turn = np.linspace(0, 2 * np.pi, 61)
     circle = _OF_95_OF_TWO * np.stack([np.cos(turn), np.sin(turn)])
-    # By eigenvalues, as a covariance may be singular, or indefinite by rounding.
+    # Eigenvalues instead of a Cholesky factor: a covariance may be singular, or indefinite by rounding.
     variances, axes = np.linalg.eigh(covariances[known])
     roots = axes * np.sqrt(np.maximum(variances, 0.0))[:, None, :]
     outlines = np.einsum("nij,jk->nki", roots, circle) + np.stack([x[known], y[known]], -1)[:, None, :]

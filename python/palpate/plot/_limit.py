@@ -16,7 +16,7 @@ from ._canvas import Canvas
 from ._checks import check_surface, check_type
 from ._units import labelled, unit_of
 
-# Errors end where the surface does: limits beyond this many lengths are cut off.
+# Limits above this many lengths of the surface are cut off.
 _MOST_LENGTHS = 10.0
 _ZONES = {"blind": ("blind", None), "mirror": ("ambiguous", "////"), "faint": ("faint", "....")}
 

@@ -16,7 +16,7 @@ from ._bench import sensor_dots
 from ._canvas import Canvas
 from ._checks import check_surface, check_type
 
-# Shares of the length where kernels are drawn.
+# Positions of the drawn kernels, as shares of the length.
 _KERNELS = (0.1, 0.3, 0.5, 0.7, 0.9)
 _MARKERS = {"deflection": "o", "raw": "o", "slope": "^", "strain": "s", "reaction": "x"}
 

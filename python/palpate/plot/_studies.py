@@ -12,7 +12,7 @@ from .._study import StudyResults
 from ._canvas import Canvas
 from ._checks import check_type
 
-# Bands that lie over each other are told apart up to so many.
+# Largest number of overlapping bands that stay distinguishable.
 _MOST_BANDS = 2
 
 

@@ -27,7 +27,7 @@ Target = Literal["position", "force", "both"]
 # Width of a 95 % interval of the normal distribution, in standard deviations.
 _WIDTH_95 = 2 * 1.959963984540054
 
-# A surface that is made of the positions alone is of 1 m, and they lie on the middle 80 % of its longer side.
+# A surface that is made from the positions alone is 1 m long; they cover the middle 80 % of its longer side.
 _MARGIN = 0.1
 _SPAN = 0.8
 
@@ -103,7 +103,7 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             self.locator_: Locator = estimator.fit(recording, seed=self._seed(), progress=False)
         except PalpateError as error:
             if self.setup is None:
-                # Which number is too small, in scikit-learn's words: the surface is not the user's own.
+                # The surface is not the user's own, so the message gives the numbers in scikit-learn's terms.
                 raise PalpateError(f"n_samples={X.shape[0]}, n_features={X.shape[1]}: {error}") from error
             raise
         if self.target != "position" and np.all(np.isnan(self.locate(X).force)):
@@ -254,7 +254,7 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
-        # scikit-learn means any number of targets; here they are positions and a force.
+        # In scikit-learn, a multi-output estimator accepts any number of targets; here they are positions and a force.
         tags.target_tags.multi_output = False
         return tags
 
@@ -477,7 +477,7 @@ class CentroidRegressor(_Plain):
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
-        # A centroid is one weighted mean of all channels.
+        # A centroid is a weighted mean of the channels, so it fits the generic test data of scikit-learn poorly.
         tags.regressor_tags.poor_score = True
         return tags
 
@@ -537,6 +537,6 @@ class ClosedFormRegressor(_Regressor):
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
-        # Readings that are no deflections of a beam tell it nothing.
+        # The closed form needs deflections of a beam, so it fits the generic test data of scikit-learn poorly.
         tags.regressor_tags.poor_score = True
         return tags

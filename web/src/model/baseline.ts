@@ -1,13 +1,11 @@
-// What the channels read untouched, from which deflections are drawn.
+// Baseline of the channels, from which deflections are drawn.
 
 import type { SampleRecord } from "../protocol";
 
-/** Readings over which the mean is taken. */
 const MEAN_OF = 100;
 
-/** Mean of the untouched readings; follows a drift while nothing touches. */
+/** Mean of the untouched readings; follows a drift between contacts. */
 export class Baseline {
-  /** Null before anything was read untouched. */
   mean: number[] | null = null;
   private count = 0;
 
@@ -26,7 +24,7 @@ export class Baseline {
     this.count = 0;
   }
 
-  /** A reading less the baseline; null before anything was read untouched. */
+  /** Subtracts the baseline; null without a baseline. */
   deflections(reading: number[]): number[] | null {
     const mean = this.mean;
     return mean === null ? null : reading.map((value, i) => value - (mean[i] ?? NaN));

@@ -1,16 +1,17 @@
-// What a chart of few pixels shows of many readings: the lowest and the highest in each stretch, so that no peak is lost.
+// Extremes of many readings by stretch of time, for charts of few pixels, so that no peak is lost.
 
 import { TIME, type History } from "./history";
 
-/** Times, then values by column; null where there is none. */
+/** Times, then values by column; null for a missing value. */
 export type Series = (number | null)[][];
 
-/** Shortest stretch of time that two points stand for, in seconds; longer ones are this times a power of two. */
+/** Shortest stretch, in seconds; longer ones are this times a power of two. */
 const SHORTEST_S = 2 ** -12;
 
 /**
- * The rows of a history in a span of time, of the columns asked for. Beyond `most` rows, a stretch of time gives two points a column: its lowest and
- * its highest value, in the order in which they came. Stretches begin at multiples of their length, so that points stay where they are while the window moves.
+ * Returns the rows of a history in a span of time. Beyond `most` rows, a stretch gives the lowest and
+ * the highest value of each column, in order of time. Stretches begin at multiples of their length, so
+ * that points stay while the window moves.
  */
 export function envelope(history: History, columns: number[], from_s: number, to_s: number, most: number): Series {
   const first = Math.max(0, history.firstFrom(from_s) - 1);

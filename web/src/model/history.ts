@@ -1,9 +1,9 @@
-// The readings of the last ten minutes, for charts: the newest as they came, older ones thinned.
+// Readings of the last ten minutes for charts: recent ones complete, older ones thinned.
 
 import type { SampleRecord } from "../protocol";
 import { isPlaced } from "../words";
 
-/** Columns of a history: time, position, its interval, force, its interval, then one a channel. */
+/** Columns of a history: time, position, its interval, force, its interval, then one per channel. */
 export const TIME = 0;
 export const X = 1;
 export const X_LOW = 2;
@@ -16,19 +16,18 @@ export const Y_LOW = 8;
 export const Y_HIGH = 9;
 export const FIRST_CHANNEL = 10;
 
-/** Half the width of a 95 % interval, in standard deviations. */
 const Z_95 = 1.96;
 
-/** Seconds that a history keeps. */
 export const KEPT_S = 600;
-/** Seconds of older rows that two rows stand for. */
+/** Duration of a bucket of two older rows, in seconds. */
 const BUCKET_S = 0.1;
-/** Rows of the older part: two a bucket, and as many gaps at most. */
+/** Rows of the older part: two per bucket, and as many gaps at most. */
 const OLD_ROWS = Math.ceil((3 * KEPT_S) / BUCKET_S);
 
 /**
- * Rows by time, the oldest first; unknown values are NaN. The newest rows are kept as they came. A row that gives way to a newer one goes into a bucket of
- * 0.1 s, of which two rows stay: the lowest and the highest value of every column, so that no peak is lost.
+ * Rows by time, the oldest first; unknown values are NaN. The newest rows are complete. Older rows go
+ * into buckets of 0.1 s, which keep the lowest and the highest value of every column, so that no peak
+ * is lost.
  */
 export class History {
   private readonly recent: Ring;
@@ -53,12 +52,12 @@ export class History {
     this.add(this.row(sample));
   }
 
-  /** Adds a row without values, so that no line is drawn over a stretch without readings. */
+  /** Adds a row without values, so that no line is drawn over a gap. */
   pushGap(time_s: number): void {
     this.add(gap(time_s, FIRST_CHANNEL + this.channels));
   }
 
-  /** Adds samples from before the first row; samples that are not before it are left out. */
+  /** Adds samples from before the first row; other samples are ignored. */
   pushBefore(samples: readonly SampleRecord[], gaps: readonly number[]): void {
     if (this.old.count > 0) return;
     const first = this.recent.count === 0 ? Infinity : this.recent.at(TIME, 0);
@@ -73,7 +72,7 @@ export class History {
     this.bucket.clear();
   }
 
-  /** The time of the newest row; NaN of an empty history. */
+  /** Time of the newest row; NaN for an empty history. */
   lastTime(): number {
     return this.length === 0 ? NaN : this.at(TIME, this.length - 1);
   }
@@ -83,7 +82,7 @@ export class History {
     return row < old ? this.old.at(column, row) : this.recent.at(column, row - old);
   }
 
-  /** The first row that is not before a time. */
+  /** Index of the first row that is not before a time. */
   firstFrom(time_s: number): number {
     let low = 0;
     let high = this.length;
@@ -108,11 +107,11 @@ export class History {
     set(Y, placed ? sample.y_mm : NaN);
     set(Y_LOW, placed ? sample.y_95_mm?.[0] : NaN);
     set(Y_HIGH, placed ? sample.y_95_mm?.[1] : NaN);
-    // The force of a reading that no contact explains is unknown; 0 would look like a release.
+    // The force of an unexplained reading is unknown; 0 would look like a release.
     const force = placed ? sample.force_n : sample.status === "no_contact" ? 0 : NaN;
     const half = Z_95 * (sample.sd_force_n ?? NaN);
     set(FORCE, force);
-    // Contacts press: the interval of a force that presses ends at 0.
+    // Contacts press, so the interval of a positive force has no negative part.
     const low = (force ?? NaN) - half;
     set(FORCE_LOW, placed ? (sample.force_95_n?.[0] ?? ((force ?? NaN) >= 0 ? Math.max(low, 0) : low)) : NaN);
     set(FORCE_HIGH, placed ? (sample.force_95_n?.[1] ?? (force ?? NaN) + half) : NaN);
@@ -134,7 +133,6 @@ function gap(time_s: number, columns: number): Float64Array {
   return row;
 }
 
-/** A ring of rows. */
 class Ring {
   private readonly columns: Float64Array[];
   private readonly evicted: Float64Array;
@@ -149,7 +147,7 @@ class Ring {
     this.evicted = new Float64Array(columns);
   }
 
-  /** Adds a row; gives the oldest one where it had to give way, until the next call. */
+  /** Adds a row; returns the row that it replaces, valid until the next call. */
   push(row: ArrayLike<number>): Float64Array | null {
     const full = this.count === this.capacity;
     const place = (this.start + this.count) % this.capacity;
@@ -176,12 +174,12 @@ class Ring {
   }
 }
 
-/** Lowest and highest values of the rows of one stretch of time, in the order in which they came. */
+/** Lowest and highest values of one stretch of time, in order of time. */
 class Bucket {
   private number = NaN;
   private readonly first: Float64Array;
   private readonly second: Float64Array;
-  /** Columns whose highest value came first. */
+  /** Columns with the highest value first. */
   private readonly falls: Uint8Array;
 
   constructor(columns: number) {
@@ -190,7 +188,7 @@ class Bucket {
     this.falls = new Uint8Array(columns);
   }
 
-  /** Adds a row; a stretch that has ended goes to `into`. A row without values ends its stretch. */
+  /** Adds a row; writes a finished stretch to `into`. A row without values ends the stretch. */
   add(row: Float64Array, into: Ring): void {
     const number = Math.floor(row[TIME]! / BUCKET_S);
     const isGap = row.every((value, i) => i === TIME || Number.isNaN(value));

@@ -1,13 +1,14 @@
-// The error budget: the limit of the setup beside the uncertainty of an estimate.
+// Error budget: the limit of the setup and the uncertainty of an estimate.
 
 import type { LimitInfo, SessionInfo } from "../protocol";
 
-/** Kinds of surface whose readings grow in proportion to the force, so that the limit falls as 1 / force. */
+/** Kinds of surface with readings in proportion to the force, so that the limit falls as 1 / force. */
 const LINEAR = ["beam", "plate"];
 
 /**
- * The factor from the limit as given to that of a contact's force. Readings are influence × force, and so the Cramér–Rao bound of the
- * position is proportional to 1 / force; of a known force, and of a surface that is not linear, the limit holds as it is.
+ * Factor from the given limit to that at a contact's force. Readings are influence × force, so the
+ * Cramér–Rao bound of the position is proportional to 1 / force. For a known force or a nonlinear
+ * surface the factor is 1.
  */
 export function forceFactor(session: SessionInfo, force_n: number | undefined): number {
   const scales = session.force.unknown && LINEAR.includes(session.surface?.kind ?? "");
@@ -15,7 +16,10 @@ export function forceFactor(session: SessionInfo, force_n: number | undefined): 
   return session.limit.force_n / force_n;
 }
 
-/** The limit at a place in mm: between positions of a line by interpolation, of a plane that of the nearest position. Null where there is none. */
+/**
+ * Limit at a place in mm: interpolated on a line, of the nearest position on a plane; null without a
+ * limit.
+ */
 export function limitAt(limit: LimitInfo, x_mm: number, y_mm: number | undefined): number | null {
   const along = limit.positions_mm;
   if (along.length === 0) return null;

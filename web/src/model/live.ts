@@ -1,16 +1,16 @@
-// What the page knows of the session, from its messages.
+// State of the session, from its messages.
 
 import type { EventRecord, PastRecord, SampleRecord, StateRecord, StreamMessage } from "../protocol";
 import { Baseline } from "./baseline";
 import { History } from "./history";
 import { Trail } from "./trail";
 
-/** Events that are kept; moves are many, and only in the recording. */
+/** Largest number of events; moves are many, and only in the recording. */
 const EVENTS = 1_000;
-/** Rows of a history that are kept as they came: a minute of 1,000 readings a second, ten minutes of 100. */
+/** Complete rows of a history: a minute of 1,000 readings a second, ten minutes of 100. */
 const ROWS = 60_000;
 
-/** The session by its messages. */
+/** State of the session. */
 export class Live {
   readonly history: History;
   readonly trail = new Trail();
@@ -20,21 +20,21 @@ export class Live {
   sample: SampleRecord | null = null;
   /** Messages that this browser was too slow for. */
   missed = 0;
-  /** Grows with every event, so that a list knows when to be written anew. */
+  /** Grows with every event, so that lists are rewritten. */
   eventCount = 0;
 
   constructor(readonly channels: number) {
     this.history = new History(channels, ROWS);
   }
 
-  /** Takes a message; gives the events that a person should be told. */
+  /** Processes a message; returns the events for announcement. */
   take(message: StreamMessage): EventRecord[] {
     this.state = message.state;
     this.missed += message.missed;
     const told = message.events.filter((event) => event.event !== "move");
     let next = 0;
     for (const sample of message.samples) {
-      // A gap lies before the first reading after it.
+      // A gap precedes the first reading after it.
       while (next < told.length && told[next]!.time_s <= sample.time_s) this.note(told[next++]!);
       this.add(sample);
     }
@@ -42,7 +42,7 @@ export class Live {
     return told;
   }
 
-  /** Takes what the server kept of the session from before the first message. */
+  /** Processes the server's record of the session before the first message. */
   takePast(past: PastRecord): void {
     const firstEvent = this.events[0]?.time_s ?? Infinity;
     const events = past.events.filter((event) => event.time_s < firstEvent);
@@ -54,7 +54,7 @@ export class Live {
   }
 
   private add(sample: SampleRecord): void {
-    // Another session began: of a server that was started anew.
+    // Another session of a restarted server.
     if (this.sample !== null && sample.number < this.sample.number) {
       this.history.clear();
       this.trail.clear();

@@ -1,11 +1,11 @@
-// A recording, and the instant of it that is shown.
+// A recording with a playhead.
 
 import type { RecordingContent, SampleRecord } from "../protocol";
 import { Baseline } from "./baseline";
 import { History } from "./history";
 import { Trail, TRAIL_S } from "./trail";
 
-/** A recording with a playhead. Positions of the playhead are seconds from its start. */
+/** A recording with a playhead, in seconds from its start. */
 export class Player {
   readonly history: History;
   readonly baseline = new Baseline();
@@ -42,25 +42,23 @@ export class Player {
     this.at_s = Math.min(Math.max(at_s, 0), this.seconds);
   }
 
-  /** Lets time go on; stops at the end. */
   advance(by_s: number): void {
     if (!this.playing) return;
     this.seek(this.at_s + by_s * this.speed);
     if (this.at_s >= this.seconds) this.playing = false;
   }
 
-  /** Begins or stops to play, at the end from the start. */
+  /** Starts or stops playing; restarts at the end. */
   toggle(): void {
     this.playing = !this.playing;
     if (this.playing && this.at_s >= this.seconds) this.at_s = 0;
   }
 
-  /** The last sample that is not after the playhead; the first before it. */
+  /** Last sample that is not after the playhead, or the first one. */
   sample(): SampleRecord | null {
     return this.content.samples[this.index()] ?? null;
   }
 
-  /** The trail behind the playhead. */
   trail(): Trail {
     const trail = new Trail();
     const now = this.start_s + this.at_s;
@@ -70,7 +68,6 @@ export class Player {
     return trail;
   }
 
-  /** Samples that were fetched. */
   get length(): number {
     return this.content.samples.length;
   }

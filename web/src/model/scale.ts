@@ -1,12 +1,11 @@
-// Scales: millimetres to pixels, and the numbers to write beside an axis.
+// Scales: millimetres to pixels, and the numbers of an axis.
 
-/** A linear map from one interval to another. */
 export function linear(from: [number, number], to: [number, number]): (value: number) => number {
   const factor = (to[1] - to[0]) / (from[1] - from[0]);
   return (value) => to[0] + (value - from[0]) * factor;
 }
 
-/** A number of the form 1, 2 or 5 × 10ⁿ that is at least `least`. */
+/** Smallest number 1, 2 or 5 × 10ⁿ that is at least `least`. */
 export function roundUp(least: number): number {
   const power = 10 ** Math.floor(Math.log10(least));
   const share = least / power;
@@ -15,13 +14,13 @@ export function roundUp(least: number): number {
   return step * power;
 }
 
-/** Round numbers from 0 to `end`, at most `most` + 1 of them. */
+/** Round numbers from 0 to `end`, at most `most` + 1. */
 export function ticks(end: number, most: number): number[] {
   const step = roundUp(end / most);
   return Array.from({ length: Math.floor(end / step + 1e-9) + 1 }, (_, i) => i * step);
 }
 
-/** Where a surface of a length and a width lies in a frame, to scale and in the middle. */
+/** Rectangle of a surface, to scale and centred in a frame. */
 export function fit(
   surface: { length: number; width: number },
   frame: { left: number; top: number; width: number; height: number },

@@ -1,4 +1,4 @@
-// One instant of the page: every view of a frame is drawn from the same snapshot.
+// One instant of the page, for all views of a frame.
 
 import type { CalibrationRecord, EventRecord, SampleRecord, SessionInfo, StateRecord } from "../protocol";
 import type { History } from "./history";
@@ -6,30 +6,27 @@ import type { Live } from "./live";
 import type { Player } from "./player";
 import type { TrailPoint } from "./trail";
 
-/** A stretch of time that the charts show. */
 export interface Span {
   readonly from_s: number;
   readonly to_s: number;
-  /** Instant of a replay, marked by a line; null of a live session. */
+  /** Instant of a replay, marked by a line; null for a live session. */
   readonly head_s: number | null;
 }
 
-/** The page at one instant. Later readings do not change it. */
+/** The page at one instant, independent of later readings. */
 export interface Snapshot {
   readonly session: SessionInfo;
   readonly state: StateRecord | null;
-  /** Newest reading of the live session. */
   readonly live: SampleRecord | null;
-  /** Reading that is shown: of the replay, where there is one. */
+  /** Displayed reading, live or of the replay. */
   readonly sample: SampleRecord | null;
   readonly trail: readonly (TrailPoint & { age: number })[];
-  /** Readings less their baseline, in the units of the channels; null while nothing touches, and without a baseline. */
+  /** Readings minus baseline, in the units of the channels; null without a contact or baseline. */
   readonly deflections: readonly number[] | null;
-  /** Mean untouched reading. */
   readonly untouched: readonly number[] | null;
   readonly calibration: CalibrationRecord | null;
   readonly events: readonly EventRecord[];
-  /** Events so far; changes with every event. */
+  /** Number of events; changes with every event. */
   readonly eventCount: number;
   readonly missed: number;
   /** Rows of the charts; those after `span.to_s` are not part of the snapshot. */
@@ -37,7 +34,6 @@ export interface Snapshot {
   readonly span: Span;
 }
 
-/** What a snapshot is taken of. */
 export interface Scene {
   session: SessionInfo;
   live: Live;

@@ -1,8 +1,9 @@
-// The curve through measured deflections.
+// Curve through measured deflections.
 
 /**
- * Natural cubic spline through points of rising x: piecewise cubic, twice continuously differentiable, without curvature at the ends,
- * as a beam between the points that hold it (C. de Boor, A Practical Guide to Splines, 1978, chapter IV). Beyond the ends it is straight.
+ * Natural cubic spline through points of rising x: piecewise cubic, twice continuously differentiable,
+ * without curvature at the ends, like a beam between its supports (C. de Boor, A Practical Guide to
+ * Splines, 1978, chapter IV). Beyond the ends it is straight.
  */
 export function naturalSpline(points: { x: number; y: number }[]): (x: number) => number {
   const n = points.length;

@@ -1,4 +1,4 @@
-// What a chart shows, in a sentence; and its rows as a file.
+// Description of a chart in a sentence, and its rows as a file.
 
 import type { SessionInfo } from "../protocol";
 import { number, unit } from "../words";
@@ -6,7 +6,6 @@ import * as columns from "./history";
 import type { History } from "./history";
 import type { Span } from "./snapshot";
 
-/** Lowest, highest and last value of a column over a span. */
 export function summary(history: History, span: Span, name: string, column: number, unit: string): string {
   let [low, high, last] = [Infinity, -Infinity, NaN];
   const end = history.firstFrom(span.to_s + 1e-9);
@@ -24,7 +23,7 @@ export function summary(history: History, span: Span, name: string, column: numb
   return `${name}: ${words(low)} to ${words(high)}, ${now}.`;
 }
 
-/** The rows of a span as CSV: time, position, force, their intervals, and the channels. */
+/** Rows of a span as CSV: time, position, force, their intervals, and the channels. */
 export function csv(session: SessionInfo, history: History, span: Span): string {
   const plane = session.surface?.width_mm != null && !["beam", "digit"].includes(session.surface.kind);
   const heads: [string, number][] = [
@@ -54,7 +53,6 @@ function valueWords(value: number, column: number): string {
   return column === columns.TIME ? value.toFixed(6) : String(value);
 }
 
-/** A field of CSV. */
 function quoted(text: string): string {
   return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }

@@ -1,4 +1,4 @@
-// Where the contact was in the last second.
+// Positions of the contact in the last second.
 
 import type { SampleRecord } from "../protocol";
 import { isPlaced } from "../words";
@@ -30,7 +30,7 @@ export class Trail {
     this.points = [];
   }
 
-  /** The points, oldest first, each with its age as a share of the trail: 0 now, 1 about to go. */
+  /** Points, oldest first, with their ages as shares of the trail: 0 now, 1 at the end. */
   aged(): (TrailPoint & { age: number })[] {
     const now = this.points.at(-1)?.time_s ?? 0;
     return this.points.map((point) => ({ ...point, age: (now - point.time_s) / TRAIL_S }));

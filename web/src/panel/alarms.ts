@@ -1,11 +1,11 @@
-// Alarms: rules that a person sets, and the line at the top of the page when one is raised.
+// Alarms: rules of the user, and the banner of a raised alarm.
 
 import { api, ApiError } from "../api";
 import { need, save, setText } from "../dom";
 import type { EventRecord } from "../protocol";
 import { clock } from "../words";
 
-/** A rule as a person fills it in; bands are numbers as text, empty where there is none. */
+/** A rule of the form; bands are numbers as text, or empty. */
 export interface AlarmRule {
   name: string;
   when: string;
@@ -15,11 +15,10 @@ export interface AlarmRule {
   text: string;
 }
 
-/** Ends of bands that a person left open: beyond any surface and any force. */
+/** Ends of half-open bands: beyond any surface and any force. */
 const FAR_MM = 1e6;
 const FAR_N = 1e6;
 
-/** The rule as text of a rule file. */
 export function ruleText(rule: AlarmRule): string {
   const lines = ["[[rule]]", `name = ${quoted(rule.name)}`];
   if (rule.when === "contact") {
@@ -32,7 +31,7 @@ export function ruleText(rule: AlarmRule): string {
   return `${lines.join("\n")}\n`;
 }
 
-/** What was set, and how long it holds. */
+/** Words about the set alarms and their lifetime. */
 export function alarmsSet(count: number, file: string | null): string {
   if (count === 0) return "No alarms are set.";
   const are = `${count} ${count === 1 ? "alarm is" : "alarms are"} set`;
@@ -45,7 +44,7 @@ function band(key: string, [low, high]: [string, string], unit: string, far: num
   return [`${key} = ["${from} ${unit}", "${to} ${unit}"]`];
 }
 
-/** A text as a basic string of TOML, whose escapes are those of JSON. */
+/** A basic string of TOML, with the escapes of JSON. */
 function quoted(text: string): string {
   return JSON.stringify(text).replaceAll("\u007f", "\\u007f");
 }
@@ -74,7 +73,7 @@ export class Alarms {
     return need<HTMLTextAreaElement>("alarm-file");
   }
 
-  /** Shows the alarms among new events until a person dismisses them. */
+  /** Shows the alarms among new events until they are dismissed. */
   take(events: readonly EventRecord[]): void {
     const alarms = events.filter((event) => event.event === "alarm");
     const last = alarms.at(-1);

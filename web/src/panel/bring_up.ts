@@ -1,4 +1,4 @@
-// A board without a rig: what it sends, and the form that makes a rig for it.
+// A board without a rig: its output, and the form that makes a rig.
 
 import { api, ApiError } from "../api";
 import { element, need, setText } from "../dom";
@@ -6,9 +6,8 @@ import type { BringUpRecord, RigForm } from "../protocol";
 import { badFrameWords, hertz } from "../words";
 import { FieldProblems } from "./field_problems";
 
-/** Milliseconds between two looks. */
 const LOOK_MS = 200;
-/** Looks that the curve of a channel shows: 20 s. */
+/** Requests of the curve of a channel: 20 s. */
 const TRACED = 100;
 /** Newtons of a gram: standard gravity. */
 const NEWTONS = { g: 9.80665e-3, kg: 9.80665, N: 1 };
@@ -49,7 +48,6 @@ export class BringUpPanel {
     form.addEventListener("input", () => this.changed());
   }
 
-  /** Begins to follow the board. */
   follow(): void {
     if (this.looks) return;
     this.looks = true;
@@ -58,7 +56,7 @@ export class BringUpPanel {
     this.looking = this.look();
   }
 
-  /** Ends it, once there is a rig. */
+  /** Stops once there is a rig. */
   end(): void {
     this.looks = false;
     need("bring-up").hidden = true;
@@ -69,7 +67,7 @@ export class BringUpPanel {
     try {
       this.write(await api.bringUp());
     } catch (error) {
-      // Somebody else made the rig; a server that is away is said by the page.
+      // Another user made the rig; the page itself reports a server that does not respond.
       if (error instanceof ApiError && error.status === 409) return this.made();
     }
     if (this.looks) setTimeout(() => (this.looking = this.looks ? this.look() : this.looking), LOOK_MS);
@@ -218,7 +216,7 @@ export class BringUpPanel {
     };
   }
 
-  /** Shows the text of the rig, once all is filled in. */
+  /** Shows the text of the rig, once the form is complete. */
   private changed(): void {
     const plane = need<HTMLSelectElement>("rig-directions").value === "2";
     for (const id of ["rig-width-label", "rig-across-label"]) need(id).hidden = !plane;
@@ -254,7 +252,7 @@ export class BringUpPanel {
     const button = need<HTMLButtonElement>("rig-make");
     button.disabled = true;
     this.asked += 1;
-    // There is no board to look at once it has a rig.
+    // The server has no board without a rig any longer.
     this.looks = false;
     await this.looking;
     try {
@@ -270,7 +268,7 @@ export class BringUpPanel {
     }
   }
 
-  /** Shows a refusal beside its field, or else above the button. */
+  /** Shows a refusal beside the field, or else above the button. */
   private complainOfRig(error: unknown): void {
     const id = error instanceof ApiError && error.field !== null ? FIELDS[error.field] : undefined;
     for (const other of new Set(Object.values(FIELDS))) {
@@ -288,7 +286,7 @@ export class BringUpPanel {
   }
 }
 
-/** Places of sensors from what was typed, as in `50` or `50, 20`; null where nothing was. */
+/** Parses places of sensors such as `50` or `50, 20`; null for empty input. */
 export function sensorPlaces(typed: readonly string[]): number[][] | null {
   if (typed.every((text) => text.trim() === "")) return null;
   return typed.map((text) =>
@@ -304,7 +302,6 @@ function words(value: number | null): string {
   return value === null ? "—" : value.toLocaleString("en-GB", { maximumSignificantDigits: 7 }).replace("-", "−");
 }
 
-/** Points of a curve over the box of 100 by 24. */
 export function tracePoints(values: readonly number[]): string {
   const [low, high] = [Math.min(...values), Math.max(...values)];
   const scale = high > low ? 20 / (high - low) : 0;

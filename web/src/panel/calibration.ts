@@ -1,4 +1,4 @@
-// A guided calibration: where to press next, how presses of a place agree, and the steps that a person can take.
+// A guided calibration: the next place, agreement of presses, and steps of the user.
 
 import { api } from "../api";
 import { element, need, setText } from "../dom";
@@ -8,13 +8,11 @@ import { machineStep, MachinePanel, motionWords, setUpStep } from "./machine";
 import { mmWords, writeCheck, writePresses } from "./presses";
 import { Preview } from "./preview";
 
-/** Milliseconds between two looks at a calibration that goes on, and at one that waits for a person. */
+/** Milliseconds between two requests in a running and in a waiting calibration. */
 const LOOK_MS = 150;
 const IDLE_MS = 1_000;
-/** Milliseconds between two looks while raw readings are shown. */
 const PREVIEW_MS = 200;
 
-/** Steps that have a button. */
 type ButtonStep = Exclude<CalibrationStep, "strike" | "jog" | "touch_off">;
 
 /** Steps after which a machine moves. */
@@ -32,16 +30,14 @@ const BUTTONS: { id: string; step: ButtonStep }[] = [
   { id: "calibration-set-up", step: "set_up" },
 ];
 
-/** The panel of a calibration; hidden where the server has none. */
 export class CalibrationPanel {
-  /** Its state, while it is shown. */
   state: CalibrationRecord | null = null;
   private machine = new MachinePanel(
     (axis, by_mm) => this.act("jog", { axis, by_mm }),
     () => this.act("touch_off"),
   );
   private preview = new Preview();
-  /** Presses that the list shows: their number, and whether they can be struck out. */
+  /** Listed presses: their number, and true if they can be deleted. */
   private listed = "";
   private looks = false;
   private closed = false;
@@ -59,19 +55,18 @@ export class CalibrationPanel {
     need("calibration-presses").addEventListener("toggle", () => void this.list(true));
   }
 
-  /** Begins to follow the server's calibration. */
   follow(): void {
     if (this.looks || this.closed) return;
     this.looks = true;
     void this.look();
   }
 
-  /** True while a person is guided, and there is no estimate to show. */
+  /** Returns true while a user is guided, without an estimate. */
   get guides(): boolean {
     return this.state !== null && !["assessing", "done"].includes(this.state.phase);
   }
 
-  /** Takes a step by a key, where its button is there. */
+  /** Takes a step by key, if its button is enabled. */
   key(step: ButtonStep): void {
     const button = BUTTONS.find((button) => button.step === step);
     if (button !== undefined && !need<HTMLButtonElement>(button.id).hidden) this.act(step);
@@ -96,7 +91,7 @@ export class CalibrationPanel {
     try {
       this.take(await api.calibration());
     } catch {
-      // The page says that the server is away; it is asked again.
+      // The page reports that the server does not respond; the panel asks again.
       if (this.state?.machine?.runs === true) this.writeProblem("The server does not answer: if the machine goes on, switch it off.");
     }
     const phase = this.state?.phase;
@@ -158,7 +153,7 @@ export class CalibrationPanel {
     void this.list(false);
   }
 
-  /** Lists the presses where the list is open and they have changed, or `anew`. */
+  /** Lists the presses if the list is open and they have changed, or with `anew`. */
   private async list(anew: boolean): Promise<void> {
     const state = this.state;
     if (state === null || state.phase === "checking" || !need<HTMLDetailsElement>("calibration-presses").open) return;
@@ -194,13 +189,11 @@ export class CalibrationPanel {
   }
 }
 
-/** A number of an input; undefined where it is empty. */
 function inputNumber(id: string): number | undefined {
   const value = need<HTMLInputElement>(id).valueAsNumber;
   return Number.isFinite(value) ? value : undefined;
 }
 
-/** What the operator states. */
 function statements(): StepDetails {
   const details: StepDetails = {};
   const [placement_mm, second_force_n] = [inputNumber("calibration-placement"), inputNumber("calibration-second")];
@@ -210,7 +203,7 @@ function statements(): StepDetails {
   return details;
 }
 
-/** Asks for what is not known before the first press of a run by hand. */
+/** Asks for unknown statements before the first press of a run by hand. */
 function writeStatements(state: CalibrationRecord): void {
   const asks = state.phase === "ready" && state.machine === null && state.left > 0;
   need("calibration-placement-row").hidden = state.placement_mm !== null;
@@ -219,7 +212,7 @@ function writeStatements(state: CalibrationRecord): void {
   if (state.single_weight_n !== null) setText(need("calibration-weights-why"), weightWords(state.single_weight_n));
 }
 
-/** Why a second weight is asked for. */
+/** Reason for a second weight. */
 export function weightWords(force_n: number): string {
   return `All presses have ${Number(force_n.toPrecision(3))} N, and the force in use is unknown: one weight does not determine how readings grow with the force.`;
 }
@@ -229,7 +222,6 @@ function beginWords(state: CalibrationRecord): string {
   return state.taken === 0 ? "Begin " : "Go on ";
 }
 
-/** Instruction for the person. */
 export function stepWords(state: CalibrationRecord): string {
   switch (state.phase) {
     case "ready":

@@ -1,14 +1,12 @@
-// The log of events, its search, and what is said aloud.
+// Log of events, its search, and announcements.
 
 import { element, need, setText } from "../dom";
 import type { Snapshot } from "../model/snapshot";
 import type { EventRecord } from "../protocol";
 import { clock, eventWords } from "../words";
 
-/** Events listed at most. */
 const LISTED = 200;
 
-/** Kinds of events that a person can choose. */
 const KINDS: Record<string, string> = {
   touch_down: "contact",
   lift_off: "contact",
@@ -51,7 +49,7 @@ export class Events {
   }
 }
 
-/** Events of a kind whose time and words have every word of a search, in any case. */
+/** Events of a kind that contain every word of a search, in any case. */
 export function findEvents(events: readonly EventRecord[], search: string, kind: string): EventRecord[] {
   const words = search.toLowerCase().split(/\s+/).filter((word) => word !== "");
   return events.filter((event) => {
@@ -61,7 +59,10 @@ export function findEvents(events: readonly EventRecord[], search: string, kind:
   });
 }
 
-/** Says touch-down, lift-off and what else a person must know to a screen reader: the newest of a message. */
+/**
+ * Announces the newest event of a message to a screen reader: touch-down, lift-off and other important
+ * events.
+ */
 export function announce(events: EventRecord[]): void {
   const last = events.at(-1);
   if (last !== undefined) need("announcer").textContent = eventWords(last);

@@ -2,12 +2,15 @@
 
 import { element, setText } from "../dom";
 
-/** Problems of the fields of a form; a field has an element of its id with `-problem` behind it, made where there is none. */
+/**
+ * Problems of the fields of a form. The message of a field is an element with its id and `-problem`,
+ * created on demand.
+ */
 export class FieldProblems {
   private touched = new Set<Element>();
 
   constructor(private form: HTMLFormElement) {
-    // Messages stand beside the fields instead of over them.
+    // Messages are beside the fields instead of over them.
     form.noValidate = true;
     form.addEventListener("change", (event) => {
       if (event.target instanceof Element) this.touched.add(event.target);
@@ -15,7 +18,6 @@ export class FieldProblems {
     });
   }
 
-  /** Shows the problem of a field, or none. */
   set(field: HTMLElement, words: string | null): void {
     const id = `${field.id}-problem`;
     let problem = document.getElementById(id);
@@ -36,14 +38,14 @@ export class FieldProblems {
     }
   }
 
-  /** Shows what is wrong with the fields that a person has left. */
+  /** Shows problems of the fields that the user has left. */
   showInvalid(): void {
     for (const field of this.fields()) {
       this.set(field, this.touched.has(field) ? fieldProblem(field) : null);
     }
   }
 
-  /** Shows what is wrong with any field, and goes to the first; true where nothing is. */
+  /** Shows problems of all fields, and focuses the first; returns true without problems. */
   check(): boolean {
     const fields = this.fields();
     fields.forEach((field) => this.touched.add(field));
@@ -58,7 +60,6 @@ export class FieldProblems {
   }
 }
 
-/** The part of a field that its problem depends on. */
 export interface Field {
   value: string;
   disabled: boolean;
@@ -69,7 +70,7 @@ export interface Field {
   validationMessage: string;
 }
 
-/** The problem of a field in words; null where there is none. */
+/** Problem of a field in words; null without one. */
 export function fieldProblem(field: Field): string | null {
   const { validity } = field;
   if (field.disabled || validity.valid) return null;

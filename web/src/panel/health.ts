@@ -5,7 +5,6 @@ import type { Snapshot } from "../model/snapshot";
 import type { SessionInfo } from "../protocol";
 import { badFrameWords, channelWords, hertz, number, seconds, size, unit } from "../words";
 
-/** The table of channels and the list about the source. */
 export class Health {
   private rows: HTMLTableCellElement[][];
   private facts = new Map<string, HTMLElement>();
@@ -73,7 +72,7 @@ export class Health {
 function ageWords(shown: Snapshot): string {
   if (shown.live === null) return "—";
   const age_s = Date.now() / 1000 - shown.live.time_s;
-  // The reading has the time of the server, and the page that of the browser.
+  // The reading has the time of the server, the page that of the browser.
   return age_s < -0.05 ? "unknown: the server's clock is ahead of this browser's" : seconds(Math.max(0, age_s));
 }
 

@@ -1,11 +1,11 @@
-// The machine of a calibration: what it will move, where it is, and the stop that must reach it.
+// The machine of a calibration: planned moves, position, and the stop.
 
 import { api } from "../api";
 import { element, need, setText } from "../dom";
 import type { Axis, CalibrationRecord, MachineRecord, MovesRecord } from "../protocol";
 import { fixed, seconds, size } from "../words";
 
-/** Milliseconds between two tries to stop it, and tries until the page says that it cannot. */
+/** Milliseconds between two attempts to stop it, and attempts before the page reports a failure. */
 const AGAIN_MS = 250;
 const TRIES = 8;
 
@@ -20,7 +20,7 @@ export class MachinePanel {
     }
     need("machine-touch-off").addEventListener("click", touchOff);
     need("machine-stop").addEventListener("click", () => void this.stop());
-    // Whatever has the focus, and whether single keys are on or off.
+    // With any focus, and with single keys on or off.
     document.addEventListener("keydown", (event) => {
       if (event.key !== "Escape" || !this.runs) return;
       event.preventDefault();
@@ -29,13 +29,13 @@ export class MachinePanel {
     }, true);
   }
 
-  /** Says that a machine is about to run: it can be stopped from now on. */
+  /** Marks that a machine is about to run; from now on it can be stopped. */
   begins(): void {
     this.runs = true;
     this.asked = false;
   }
 
-  /** Says that it runs: a stop that came before the server had begun is said again. */
+  /** Marks that it runs, and repeats an earlier stop. */
   begun(): void {
     if (this.asked) void this.stop();
   }
@@ -66,7 +66,7 @@ export class MachinePanel {
     setText(need("machine-left"), machine.left_s === null ? "—" : seconds(Math.max(machine.left_s, 1)));
   }
 
-  /** Stops the machine: asks until the server has answered, and says where it has not. */
+  /** Stops the machine: repeats the request until the server answers, and reports failures. */
   async stop(): Promise<void> {
     this.asked = true;
     if (this.stopping) return;
@@ -85,23 +85,20 @@ export class MachinePanel {
   }
 }
 
-/** The chosen step of a jog, in mm. */
 function stepOf(): number {
   return Number(need<HTMLSelectElement>("machine-step").value);
 }
 
-/** A position by the machine's own axes. */
 export function atWords([x, y, z]: [number, number, number]): string {
   const place = (at: number) => String(Number(at.toFixed(3))).replace("-", "−");
   return `x ${place(x)}, y ${place(y)}, z ${place(z)} mm`;
 }
 
-/** The height that a touch-off found. */
 export function foundWords(z_mm: number): string {
   return `The untouched surface is at z ${Number(z_mm.toFixed(3))} mm, as the touch-off found it; the rig keeps that as touch = "${Number(z_mm.toFixed(3))} mm".`;
 }
 
-/** What is about to move, how far and how fast, and what stops it. */
+/** Planned moves, their speed, and ways to stop them. */
 export function movesWords(moves: MovesRecord, presses: number): string[] {
   const [below, z] = [moves.depths_mm, moves.depths_mm.map((depth) => moves.touch_z_mm - depth)];
   const limit = moves.force_limit_n === null ? "" : `more than ${size(moves.force_limit_n)} N at the load cell ${moves.load_cell}, `;
@@ -114,7 +111,7 @@ export function movesWords(moves: MovesRecord, presses: number): string[] {
   ];
 }
 
-/** The machine's step, for the one line that is read out. */
+/** Step of the machine, for the announced line. */
 export function machineStep(machine: MachineRecord, state: CalibrationRecord): string {
   switch (machine.motion) {
     case null:
@@ -133,7 +130,6 @@ export function machineStep(machine: MachineRecord, state: CalibrationRecord): s
   }
 }
 
-/** The step of a machine that is set up. */
 export function setUpStep(machine: MachineRecord, state: CalibrationRecord): string {
   switch (machine.motion) {
     case "up":
@@ -148,7 +144,6 @@ export function setUpStep(machine: MachineRecord, state: CalibrationRecord): str
   }
 }
 
-/** What it is doing just now. */
 export function motionWords(machine: MachineRecord, state: CalibrationRecord): string {
   switch (machine.motion) {
     case null:

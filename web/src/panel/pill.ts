@@ -1,9 +1,9 @@
-// The state of connection and source in two words.
+// State of connection and source in two words.
 
 import type { SessionInfo, StateRecord } from "../protocol";
 import type { Connection } from "../stream";
 
-/** Without a reading for so long the source is silent, in seconds. */
+/** Time without a reading after which the source is silent, in seconds. */
 export const SILENT_S = 2;
 
 export interface Pill {
@@ -12,7 +12,6 @@ export interface Pill {
   words: string;
 }
 
-/** What the pill says of a session. */
 export function pill(connection: Connection, session: SessionInfo | null, state: StateRecord | null, silent_s: number): Pill {
   if (connection === "lost") return { state: "bad", words: "Connection lost" };
   if (connection === "connecting" || session === null) return { state: "wait", words: "Connecting…" };
@@ -31,7 +30,6 @@ export function pill(connection: Connection, session: SessionInfo | null, state:
   return { state: "good", words: "Live" };
 }
 
-/** True of a session whose board is a program. */
 export function isSimulated(session: SessionInfo): boolean {
   return session.source === "simulated" || session.source?.startsWith("simulated:") === true;
 }

@@ -1,10 +1,10 @@
-// The presses of a calibration one by one, and the check of its locator at fresh places.
+// Presses of a calibration, and the check of its locator at new places.
 
 import { element, need, setText } from "../dom";
 import type { CheckRecord, PressRecord } from "../protocol";
 import { size } from "../words";
 
-/** A place in mm without digits that say nothing. */
+/** A place in mm, to two decimals. */
 export function mmWords(x_mm: number, y_mm?: number): string {
   const mm = (value: number) => String(Number(value.toFixed(2)));
   return y_mm === undefined ? `${mm(x_mm)} mm` : `${mm(x_mm)}, ${mm(y_mm)} mm`;
@@ -37,7 +37,7 @@ function traceOf(press: PressRecord): Node {
   return svg;
 }
 
-/** Writes the presses, the last one first; a button strikes one out. */
+/** Writes the presses, the last one first; a button deletes one. */
 export function writePresses(presses: PressRecord[], canStrike: boolean, strike: (press: number) => void): void {
   const rows = [...presses].reverse().map((press) => {
     const name = element("th", "", String(press.press));
@@ -56,14 +56,12 @@ export function writePresses(presses: PressRecord[], canStrike: boolean, strike:
   need("calibration-press-list").replaceChildren(...rows);
 }
 
-/** Error and coverage of a check in words. */
 export function checkWords(check: CheckRecord): string {
   const covered = check.covered === null ? "" : `; ${check.covered} of ${check.places.length} within their 95 % intervals`;
   const placement = check.placement_mm === null ? "" : ` Your placement of ${size(check.placement_mm)} mm is in it.`;
   return `Error ${size(check.median_mm)} mm (median), ${size(check.mean_mm)} mm (mean)${covered}.${placement} The presses are in ${check.presses}.`;
 }
 
-/** Writes a check; hides it where there is none. */
 export function writeCheck(check: CheckRecord | null): void {
   need("calibration-checked").hidden = check === null;
   if (check === null) return;

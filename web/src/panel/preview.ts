@@ -1,4 +1,4 @@
-// Raw readings before a calibration begins: values, rate and a chart, so that a person sees that the board is well.
+// Raw readings before a calibration: values, rate and a chart, which show that the board works.
 
 import { element, need, setText } from "../dom";
 import type { CalibrationRecord } from "../protocol";
@@ -6,7 +6,7 @@ import { begin } from "../view/canvas";
 import { channelStroke, palette } from "../view/palette";
 import { hertz } from "../words";
 
-/** Seconds that the chart shows, and over which the rate is taken. */
+/** Duration of the chart and of the rate, in seconds. */
 const SHOWN_S = 10;
 
 interface Seen {
@@ -15,7 +15,7 @@ interface Seen {
   reading: number[];
 }
 
-/** Rate of readings in Hz between the first and the last look; null before there are two. */
+/** Rate of readings in Hz between the first and the last request; null before the second. */
 export function rateOf(seen: { at_s: number; readings: number }[]): number | null {
   const [first, last] = [seen[0], seen[seen.length - 1]];
   if (first === undefined || last === undefined || last.at_s <= first.at_s) return null;
@@ -43,7 +43,6 @@ export class Preview {
     this.draw(now_s);
   }
 
-  /** Each channel over its own range. */
   private draw(now_s: number): void {
     const frame = begin(need<HTMLCanvasElement>("calibration-chart"));
     if (frame === null) return;

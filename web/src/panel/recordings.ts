@@ -5,7 +5,7 @@ import { element, need } from "../dom";
 import type { RecordingInfo, SessionInfo } from "../protocol";
 import { begun, bytes, seconds } from "../words";
 
-/** Asks for the recordings and lists them as the server does, newest first. */
+/** Requests and lists the recordings in the server's order, newest first. */
 export async function listRecordings(session: SessionInfo, replay: (name: string) => void): Promise<void> {
   const note = need("recordings-note");
   if (session.recording === null) {

@@ -1,4 +1,4 @@
-// The controls of a replay.
+// Controls of a replay.
 
 import { api } from "../api";
 import { need, setText } from "../dom";
@@ -6,7 +6,7 @@ import { Player } from "../model/player";
 import type { RecordingInfo } from "../protocol";
 import { seconds } from "../words";
 
-/** Samples that a replay asks for: what charts can show; of longer recordings the server thins evenly. */
+/** Requested samples of a replay; the server thins longer recordings evenly. */
 const POINTS = 8_000;
 
 export class Replay {
@@ -34,7 +34,7 @@ export class Replay {
     this.player = player;
     const scrubber = need<HTMLInputElement>("scrubber");
     scrubber.max = String(player.seconds);
-    // A step would put the end of the recording out of reach; keys step by a hundredth.
+    // A step would make the end of the recording unreachable; keys step by a hundredth.
     scrubber.step = "any";
     setText(need("replay-title"), `Replay of ${name}`);
     setText(need("replay-note"), thinnedWords(player, all.find((one) => one.name === name)));
@@ -55,7 +55,6 @@ export class Replay {
     this.write();
   }
 
-  /** Writes where the playhead is. */
   write(): void {
     const player = this.player;
     if (player === null) return;

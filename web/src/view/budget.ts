@@ -1,4 +1,4 @@
-// The error budget: the limit over the surface, and the present estimate beside it.
+// Error budget: the limit over the surface, and the present estimate.
 
 import { forceFactor, limitAt } from "../model/limit";
 import { fit, linear, ticks } from "../model/scale";
@@ -10,7 +10,7 @@ import { begin, disc, segment, textWithin, widest, type Frame } from "./canvas";
 import { palette } from "./palette";
 import { isPlane } from "./surface";
 
-/** Room around the curve, in pixels; on the left as much again as the numbers of the axis take. */
+/** Margins of the curve, in pixels; the numbers of the axis add to the left one. */
 const MARGIN = { left: 8, right: 12, top: 12, bottom: 30 };
 
 export class Budget {
@@ -23,7 +23,6 @@ export class Budget {
     need("budget").hidden = session.limit === null;
   }
 
-  /** Words and picture of the budget. */
   draw({ sample }: Snapshot): void {
     const words = budgetWords(this.session, sample);
     setText(need("budget-words"), words);
@@ -61,7 +60,7 @@ function drawCurve({ ctx, width, height }: Frame, session: SessionInfo, sample: 
   const factor = forceFactor(session, placed ? sample.force_n : undefined);
   const sds = limit.sd_mm.flatMap((sd) => (sd === null || sd <= 0 ? [] : [sd * factor]));
   if (sds.length === 0) return;
-  // Over a decade or more: the ends of a beam are far worse than its middle.
+  // At least a decade: the ends of a beam are far worse than the middle.
   const lowest = Math.floor(Math.log10(Math.min(...sds)));
   const highest = Math.max(lowest + 1, Math.ceil(Math.log10(Math.max(...sds))));
   const [top, bottom] = [MARGIN.top, height - MARGIN.bottom];
@@ -151,8 +150,6 @@ function drawMap({ ctx, width, height }: Frame, session: SessionInfo, sample: Sa
   ctx.stroke();
 }
 
-
-/** The shades of the map between the limit where it is best and where it is worst. */
 function drawShades(ctx: CanvasRenderingContext2D, best: string, worst: string, width: number, bottom: number): void {
   const { quiet, accent, card, line } = palette();
   ctx.fillStyle = quiet;

@@ -1,4 +1,4 @@
-// A canvas that has as many pixels as the screen shows of it.
+// Canvases with the pixels of the screen.
 
 export interface Frame {
   ctx: CanvasRenderingContext2D;
@@ -6,7 +6,7 @@ export interface Frame {
   height: number;
 }
 
-/** Clears a canvas and gives it in CSS pixels; null while it has no size. */
+/** Clears a canvas in CSS pixels; returns null while it has no size. */
 export function begin(canvas: HTMLCanvasElement): Frame | null {
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   const ctx = canvas.getContext("2d");
@@ -34,12 +34,11 @@ export function segment(ctx: CanvasRenderingContext2D, x0: number, y0: number, x
   ctx.stroke();
 }
 
-/** Width in pixels of the widest of some texts, in the canvas's font. */
 export function widest(ctx: CanvasRenderingContext2D, texts: readonly string[]): number {
   return Math.ceil(Math.max(0, ...texts.map((text) => ctx.measureText(text).width)));
 }
 
-/** Writes a text centred on a pixel, moved in from the edges of a canvas of this width. */
+/** Writes a text centred on a pixel, but within a canvas of this width. */
 export function textWithin(ctx: CanvasRenderingContext2D, text: string, px: number, y: number, width: number): void {
   const half = ctx.measureText(text).width / 2 + 2;
   ctx.textAlign = "center";

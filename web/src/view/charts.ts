@@ -1,4 +1,4 @@
-// The charts over time: position, force, channels.
+// Charts over time: position, force, channels.
 
 import uPlot from "uplot";
 import { envelope } from "../model/envelope";
@@ -12,13 +12,12 @@ import { segment, widest } from "./canvas";
 import { channelStroke, onTheme, palette } from "./palette";
 import { isPlane } from "./surface";
 
-/** Points of a chart at most: two a pixel of a wide screen. */
+/** Largest number of points of a chart: two per pixel of a wide screen. */
 const MOST_POINTS = 2_000;
 
-/** Seconds between two times that are written at the axis. */
 const SECONDS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200];
 
-/** Milliseconds between two changes of the text that stands for a chart. */
+/** Milliseconds between two updates of a chart's text alternative. */
 const TEXT_MS = 2_000;
 
 export class Charts {
@@ -63,12 +62,12 @@ export class Charts {
     this.writeTexts(shown);
   }
 
-  /** Draws the snapshot once more: after a change of theme or choice while paused. */
+  /** Redraws the snapshot after a change of theme or selection while paused. */
   private again(): void {
     if (this.shown !== null) this.draw(this.shown);
   }
 
-  /** Texts of the charts for screen readers; they change slowly, so that they can be read. */
+  /** Texts of the charts for screen readers; they change slowly enough to be read. */
   private writeTexts(shown: Snapshot): void {
     const now = performance.now();
     if (now - this.texted_ms < TEXT_MS) return;
@@ -82,7 +81,6 @@ export class Charts {
     this.channels.describe(`Readings of ${channels.length} channels over ${seconds(span.to_s - span.from_s)}. ${channels.join(" ")}`);
   }
 
-  /** The charts one below the other, as a picture. */
   png(): HTMLCanvasElement {
     const titles = ["Position in mm", need("chart-force-title").textContent, need("chart-channels-title").textContent];
     return stacked(this.all.map((chart, i) => ({ title: titles[i] ?? "", canvas: chart.canvas })), this.legend());
@@ -138,7 +136,6 @@ interface Line {
   shown?: () => boolean;
 }
 
-/** A value and the ends of its interval. */
 function banded(label: string, stroke: () => string, [value, low, high]: [number, number, number], dash: number[] = []): Line[] {
   return [
     { label, column: value, stroke, dash, width: 2 },
@@ -151,7 +148,7 @@ class Chart {
   private host: HTMLElement;
   private plot: uPlot;
   private head_s: number | null = null;
-  /** Range of the values that a person chose; null where the chart chooses. */
+  /** Selected range of the values; null for an automatic range. */
   private range: [number, number] | null = null;
 
   constructor(
@@ -184,12 +181,12 @@ class Chart {
     });
   }
 
-  /** Scales the range of the values about its middle; null lets the chart choose it again. */
+  /** Scales the range of the values about its middle; null resets it. */
   private zoom(factor: number | null): void {
     const { min, max } = this.plot.scales.y!;
     if (factor === null || min == null || max == null) return this.setRange(null);
     const [middle, half] = [(min + max) / 2, (factor * (max - min)) / 2];
-    // A range that doubles cannot tell apart has no axis.
+    // A range below the resolution of doubles has no axis.
     if (half > 1e-12 * Math.abs(middle) && half < 1e300) this.setRange([middle - half, middle + half]);
   }
 
@@ -202,7 +199,10 @@ class Chart {
     if (min != null && max != null) this.plot.setScale("x", { min, max });
   }
 
-  /** Takes a rectangle that was drawn: its height is the new range of the values, its width the new range of the times while the page is paused. */
+  /**
+   * Selects a rectangle: its height is the range of the values, its width that of the times while the
+   * page is paused.
+   */
   private select(plot: uPlot): void {
     const { left, top, width, height } = plot.select;
     const [whole_w, whole_h] = [plot.over.clientWidth, plot.over.clientHeight];
@@ -220,7 +220,7 @@ class Chart {
     this.lines.forEach((line, i) => this.plot.setSeries(i + 1, { show: line.shown?.() ?? true }));
   }
 
-  /** Draws the span of a snapshot, each column less an offset where one is given. */
+  /** Draws the span of a snapshot; offsets are subtracted from the columns. */
   draw({ history, span }: Snapshot, offset?: (line: number) => number): void {
     this.head_s = span.head_s;
     const columns = this.lines.map((line) => line.column);
@@ -291,17 +291,15 @@ class Chart {
 
 /** Steps between two numbers of an axis: 1, 2, 2.5 or 5 times a power of ten. */
 const STEPS = Array.from({ length: 64 }, (_, i) => i - 32).flatMap((power) => [1, 2, 2.5, 5].map((step) => Number(`${step}e${power}`)));
-/** Least width of an axis, and what it takes beside its numbers, in pixels. */
+/** Least width of an axis, and room beside its numbers, in pixels. */
 const AXIS_LEAST = 40;
 const AXIS_ROOM = 18;
 
-/** Width of an axis that holds its numbers. */
 function widthOfNumbers(plot: uPlot, numbers: string[] | null): number {
   if (numbers === null || numbers.length === 0) return AXIS_LEAST;
   return Math.max(AXIS_LEAST, Math.ceil(widthOf(plot, numbers)) + AXIS_ROOM);
 }
 
-/** Width in CSS pixels of the widest of some texts in the font of the axes. */
 function widthOf(plot: uPlot, texts: string[]): number {
   const ratio = window.devicePixelRatio || 1;
   plot.ctx.save();
@@ -311,7 +309,6 @@ function widthOf(plot: uPlot, texts: string[]): number {
   return width;
 }
 
-/** Charts with their titles one below the other, and the legend of the last. */
 function stacked(charts: { title: string; canvas: HTMLCanvasElement }[], legend: { name: string; stroke: string; dash: number[] }[]): HTMLCanvasElement {
   const ratio = window.devicePixelRatio || 1;
   const out = document.createElement("canvas");
@@ -354,7 +351,7 @@ function stacked(charts: { title: string; canvas: HTMLCanvasElement }[], legend:
   return out;
 }
 
-/** The range of an axis: a tenth more than the values take, and some where they take none. */
+/** Range of an axis: the values with a margin of a tenth, or some room around a single value. */
 function roomy(low: number | null, high: number | null): [number, number] {
   if (low === null || high === null || !Number.isFinite(low) || !Number.isFinite(high)) return [0, 1];
   const room = 0.05 * (high - low) || 0.05 * Math.abs(high) || 1;

@@ -9,18 +9,16 @@ import { disc, segment, textWithin, type Frame } from "./canvas";
 import { palette } from "./palette";
 import { drawTargets } from "./targets";
 
-/** Millimetres of the units that deflections are read in. */
+/** Millimetres of the units of deflections. */
 const MM: Record<string, number> = { nm: 1e-6, um: 1e-3, "µm": 1e-3, mm: 1, cm: 10, m: 1000, in: 25.4 };
 const MARGIN = 26;
-/** Height of the axis with its numbers. */
 const AXIS = 24;
-/** Longest part of the picture's height that a deflection takes. */
 const DEFLECTION = 0.26;
 
-/** Draws surfaces of one direction; holds the exaggeration, so that it does not jump with every touch. */
+/** Draws surfaces of one direction, with a constant exaggeration that does not jump with every touch. */
 export class LineView {
   private largest_mm = 0;
-  /** Times that the deflections are exaggerated; null where none are drawn. */
+  /** Exaggeration of the deflections; null if none are drawn. */
   exaggeration: number | null = null;
 
   draw(frame: Frame, shown: Snapshot): void {
@@ -42,7 +40,7 @@ export class LineView {
     drawContact(frame, shown, x, level, shape);
   }
 
-  /** Deflection in pixels at a pixel along the surface, from the sensors that measure it. */
+  /** Deflection in pixels at a pixel along the surface, from the deflection sensors. */
   private shape(shown: Snapshot, surface: SurfaceInfo, height: number, x: (mm: number) => number): (px: number) => number {
     const { session, deflections } = shown;
     const measured = session.channels.flatMap((channel, i) => {
@@ -54,16 +52,16 @@ export class LineView {
     });
     this.exaggeration = null;
     if (measured.length < 2) return () => 0;
-    // What no contact explains may be values that no sensor reads: they do not set the scale.
+    // Readings outside the model may be invalid: they do not set the scale.
     if (isPlaced(shown.sample!.status)) {
       this.largest_mm = Math.max(this.largest_mm, ...measured.map((point) => Math.abs(point.y)));
     }
     if (this.largest_mm === 0) return () => 0;
     const perMm = (x(surface.length_mm) - x(0)) / surface.length_mm;
-    // The next round number below what fills the room.
+    // Next round number below the one that fills the room.
     const most = (DEFLECTION * height) / (this.largest_mm * perMm);
     this.exaggeration = 1 / roundUp(1 / most);
-    // A support holds the surface, unless it gives way.
+    // A rigid support has no deflection.
     const held = surface.supports.filter((support) => support.kind === "simple" || support.kind === "clamped");
     const points = [...measured, ...held.map((support) => ({ x: support.at_mm, y: 0 }))]
       .sort((one, other) => one.x - other.x)
@@ -162,7 +160,6 @@ function drawSensors(ctx: CanvasRenderingContext2D, shown: Snapshot, x: (mm: num
   }
 }
 
-/** An arrow at the place to be pressed next. */
 function drawNext(ctx: CanvasRenderingContext2D, next: PlaceRecord, x: (mm: number) => number, level: number): void {
   const px = x(next.x_mm);
   drawArrow(ctx, px, level - 16, 36);
@@ -210,7 +207,7 @@ function drawContact({ ctx, height }: Frame, shown: Snapshot, x: (mm: number) =>
   });
 }
 
-/** The 95 % interval as a bar with ends, at least as wide as its ends. */
+/** Draws the 95 % interval as a bar with ends, at least as wide as the ends. */
 function drawInterval(ctx: CanvasRenderingContext2D, one: ContactRecord, x: (mm: number) => number, level: number, alpha: number, shape: (px: number) => number): void {
   if (one.x_95_mm === undefined) return;
   const [left, right] = one.x_95_mm.map(x) as [number, number];
@@ -225,7 +222,7 @@ function drawInterval(ctx: CanvasRenderingContext2D, one: ContactRecord, x: (mm:
   ctx.globalAlpha = 1;
 }
 
-/** The interval again at the axis, where no dot covers a short one. */
+/** Draws the interval again at the axis, where no dot covers a short one. */
 function drawOnAxis(ctx: CanvasRenderingContext2D, one: ContactRecord, x: (mm: number) => number, height: number): void {
   if (one.x_95_mm === undefined) return;
   const [left, right] = one.x_95_mm.map(x) as [number, number];
@@ -233,7 +230,6 @@ function drawOnAxis(ctx: CanvasRenderingContext2D, one: ContactRecord, x: (mm: n
   ctx.fillRect(left, height - AXIS - 4, Math.max(2, right - left), 7);
 }
 
-/** An arrow that presses down on a point. */
 function drawArrow(ctx: CanvasRenderingContext2D, px: number, y: number, length: number): void {
   ctx.strokeStyle = ctx.fillStyle = palette().contact;
   ctx.lineWidth = 2.5;
@@ -245,7 +241,6 @@ function drawArrow(ctx: CanvasRenderingContext2D, px: number, y: number, length:
   ctx.fill();
 }
 
-/** Words centred on a point, moved in from the edges of the canvas. */
 function label(ctx: CanvasRenderingContext2D, text: string, px: number, y: number, colour: string): void {
   const half = ctx.measureText(text).width / 2 + 3;
   ctx.fillStyle = colour;

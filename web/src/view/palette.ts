@@ -1,4 +1,4 @@
-// The page's colours for what is drawn on canvases.
+// Colours of drawings on canvases.
 
 const NAMES = ["ink", "quiet", "line", "card", "contact", "accent", "good", "warn", "bad", "sensor"] as const;
 
@@ -7,7 +7,6 @@ export type Palette = Record<(typeof NAMES)[number], string> & { font: string };
 let known: Palette | null = null;
 const listeners: (() => void)[] = [];
 
-/** The colours of the theme that holds. */
 export function palette(): Palette {
   if (known === null) {
     const style = getComputedStyle(document.documentElement);
@@ -17,7 +16,6 @@ export function palette(): Palette {
   return known;
 }
 
-/** Calls `then` after the theme has changed. */
 export function onTheme(then: () => void): void {
   listeners.push(then);
 }
@@ -27,7 +25,10 @@ export function themeChanged(): void {
   listeners.forEach((then) => then());
 }
 
-/** Colour and dashes of a channel's line: no two of the first sixteen are alike, even without colour within a group of four. */
+/**
+ * Colour and dashes of a channel's line: the first sixteen differ, and within a group of four also
+ * without colour.
+ */
 export function channelStroke(i: number): { stroke: string; dash: number[] } {
   const hue = [210, 25, 145, 285, 340, 180, 55, 250][i % 8]!;
   const dark = document.documentElement.dataset.theme === "dark";

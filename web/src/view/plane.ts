@@ -1,4 +1,4 @@
-// A surface of two directions from above: sensors, and contacts with their 95 % regions.
+// A surface of two directions from above: sensors, and contacts with 95 % regions.
 
 import type { ContactRecord, PlaceRecord } from "../protocol";
 import { ofCovariance, ofIntervals, RADIUS_95, type Ellipse } from "../model/ellipse";
@@ -9,7 +9,7 @@ import { disc, segment, textWithin, widest, type Frame } from "./canvas";
 import { palette } from "./palette";
 import { drawTargets } from "./targets";
 
-/** Room around the surface, in pixels; on the left as much again as the numbers of the axis take. */
+/** Margins of the surface, in pixels; the numbers of the axis add to the left one. */
 const MARGIN = { left: 12, right: 16, top: 14, bottom: 30 };
 
 interface Place {
@@ -30,7 +30,7 @@ export function drawPlane({ ctx, width, height }: Frame, shown: Snapshot): void 
     height: height - MARGIN.top - MARGIN.bottom,
   };
   const { left, top, perUnit } = fit({ length, width: across }, frame);
-  // The y axis goes up, as in every drawing.
+  // The y axis points up.
   const place = {
     x: linear([0, length], [left, left + length * perUnit]),
     y: linear([0, across], [top + across * perUnit, top]),
@@ -93,7 +93,6 @@ function drawSensors(ctx: CanvasRenderingContext2D, shown: Snapshot, { x, y }: P
   }
 }
 
-/** A cross in a ring at the place to be pressed next. */
 function drawNext(ctx: CanvasRenderingContext2D, next: PlaceRecord, { x, y }: Place): void {
   const { contact, ink } = palette();
   const [px, py] = [x(next.x_mm), y(next.y_mm ?? 0)];
@@ -119,7 +118,7 @@ function drawTrail(ctx: CanvasRenderingContext2D, shown: Snapshot, { x, y }: Pla
   ctx.globalAlpha = 1;
 }
 
-/** A contact with the heat of its probability and the ellipse that holds 95 % of it. */
+/** Draws a contact with its probability density and its 95 % ellipse. */
 function drawContact(ctx: CanvasRenderingContext2D, one: ContactRecord, place: Place, words: string, mark: "full" | "hollow"): void {
   const { contact, card, ink } = palette();
   const [px, py] = [place.x(one.x_mm), place.y(one.y_mm ?? 0)];
@@ -144,7 +143,7 @@ function drawContact(ctx: CanvasRenderingContext2D, one: ContactRecord, place: P
   ctx.fillText(words, Math.min(Math.max(px, half), ctx.canvas.clientWidth - half), Math.max(py - 10, 14));
 }
 
-/** The ellipse of the covariance; of the intervals where there is none, or where force and place trade off and it does not describe what is known. */
+/** Ellipse of the covariance, or of the intervals if there is none or if force and position trade off. */
 function ellipseOf(one: ContactRecord): Ellipse | null {
   if (one.covariance_mm2 !== undefined && one.trade_off === undefined) return ofCovariance(one.x_mm, one.y_mm ?? 0, one.covariance_mm2);
   return one.x_95_mm !== undefined && one.y_95_mm !== undefined ? ofIntervals(one.x_95_mm, one.y_95_mm) : null;
@@ -153,7 +152,7 @@ function ellipseOf(one: ContactRecord): Ellipse | null {
 function drawRegion(ctx: CanvasRenderingContext2D, { x_mm, y_mm, half_mm, angle }: Ellipse, { x, y }: Place, mark: "full" | "hollow"): void {
   const [cx, cy, perUnit] = [x(x_mm), y(y_mm), x(1) - x(0)];
   const [rx, ry] = half_mm.map((half) => Math.max(1, half * perUnit)) as [number, number];
-  // Up on the surface is up on the page, where angles go clockwise.
+  // Angles go clockwise on the page, counterclockwise on the surface.
   const turned = -angle;
   const colour = palette().contact;
   if (mark === "full") {

@@ -1,16 +1,15 @@
-// The surface view: which one, and in words.
+// The surface view and its description.
 
 import type { Snapshot } from "../model/snapshot";
 import type { SessionInfo } from "../protocol";
 import { contactWords, isPlaced, number, statusWords } from "../words";
 
-/** True of a surface that is located in two directions. */
+/** Returns true for a surface of two directions. */
 export function isPlane(session: SessionInfo): boolean {
   const surface = session.surface;
   return surface !== null && surface.width_mm !== null && surface.kind !== "beam" && surface.kind !== "digit";
 }
 
-/** The picture in a sentence. */
 export function describe(shown: Snapshot): string {
   const { session, sample } = shown;
   const surface = session.surface;

@@ -1,10 +1,10 @@
-// Places that a calibration asks to be pressed.
+// Places of a calibration.
 
 import type { CalibrationRecord, PlaceRecord } from "../protocol";
 import { disc } from "./canvas";
 import { palette } from "./palette";
 
-/** Draws the places: hollow while presses are left, full when all were taken. `at` tells where a place is drawn. */
+/** Draws the places: hollow before the last press, then full. `at` maps a place to pixels. */
 export function drawTargets(ctx: CanvasRenderingContext2D, calibration: CalibrationRecord, at: (place: PlaceRecord) => [number, number]): void {
   const { accent, card } = palette();
   ctx.strokeStyle = accent;

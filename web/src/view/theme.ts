@@ -1,4 +1,4 @@
-// Dark, light, or as the system.
+// Theme: dark, light, or that of the system.
 
 import { need, remember, remembered, setText } from "../dom";
 import { themeChanged } from "./palette";

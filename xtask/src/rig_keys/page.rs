@@ -17,7 +17,6 @@ numbers or percentages, `0.05` or `\"5 %\"`. An unknown key is an error with its
 `cargo xtask rig-keys` writes this page from the types that read the files; a test compares the two.
 ";
 
-/// The page.
 pub fn page(root: &Path) -> Result<String> {
     let types = Types::read(root)?;
     let folder = root.join("crates/palpate-rig/src");
@@ -30,7 +29,7 @@ pub fn page(root: &Path) -> Result<String> {
     Ok(linked(page.text.trim_end()) + "\n")
 }
 
-/// Makes links of paths from the project's root to other manuals, by which doc comments name them.
+/// Turns paths of other manuals into links.
 fn linked(text: &str) -> String {
     let mut pieces = text.split("docs/");
     let mut linked = pieces.next().unwrap_or_default().to_owned();
@@ -50,12 +49,10 @@ fn linked(text: &str) -> String {
 struct Page<'a> {
     types: &'a Types,
     text: String,
-    /// Types that have been explained, and under which heading.
     explained: BTreeMap<(PathBuf, String), String>,
 }
 
 impl<'a> Page<'a> {
-    /// A whole file: its own keys and sections.
     fn sections(&mut self, title: &str, file: &'a Item) {
         let _ = write!(self.text, "\n## {title}\n\n{}\n", file.docs);
         let Shape::Struct(fields) = &file.shape else { return };
@@ -71,7 +68,7 @@ impl<'a> Page<'a> {
         }
     }
 
-    /// Form of a value of this type, where a cell is too small for it.
+    /// Explains a type that is too large for a cell.
     fn explain(&mut self, file: &Path, type_text: &str, path: &str, level: usize) {
         let Some(item) = self.item(file, type_text) else { return };
         if !self.is_table(item) && !self.has_words(item) {
@@ -152,7 +149,7 @@ impl<'a> Page<'a> {
         }
     }
 
-    /// Default of a key without one in its comment.
+    /// Default of a key without one in the comment.
     fn default(&self, field: &Field, file: &Path) -> String {
         let fields_of = |item: &&Item| matches!(&item.shape, Shape::Struct(fields) if fields.iter().any(|own| std::ptr::eq(own, field)));
         let all_default = self.types.all().find(fields_of).is_some_and(|item| item.serde.has("default"));
@@ -172,7 +169,6 @@ impl<'a> Page<'a> {
         }
     }
 
-    /// Values of a type, in words.
     fn value(&self, file: &Path, type_text: &str) -> String {
         let text = type_text.trim();
         let (name, inner) = match text.split_once('<') {
@@ -225,7 +221,6 @@ impl<'a> Page<'a> {
         }
     }
 
-    /// The type that is left when all that wraps it is taken away.
     fn item(&self, file: &Path, type_text: &str) -> Option<&'a Item> {
         let mut text = type_text.trim();
         while let Some((name, rest)) = text.split_once('<') {
@@ -237,7 +232,6 @@ impl<'a> Page<'a> {
         self.types.find(file, text)
     }
 
-    /// Whether keys stand in it.
     fn is_table(&self, item: &Item) -> bool {
         match &item.shape {
             Shape::Struct(_) => true,
@@ -250,7 +244,6 @@ impl<'a> Page<'a> {
         }
     }
 
-    /// Whether it is one of several words that have meanings.
     fn has_words(&self, item: &Item) -> bool {
         match &item.shape {
             Shape::Enum(variants) if is_by(item, "shape") => variants
@@ -263,7 +256,6 @@ impl<'a> Page<'a> {
     }
 }
 
-/// The name of a key.
 pub fn key(field: &Field) -> String {
     field.serde.text("rename").unwrap_or_else(|| field.name.clone())
 }
@@ -289,7 +281,7 @@ fn quantity(dimension: &str) -> &str {
     }
 }
 
-/// A comment without "; … by default", and that default.
+/// Splits "; … by default" off a comment.
 pub fn split_default(docs: &str) -> (String, Option<String>) {
     let Some((before, after)) = docs.split_once(" by default") else {
         return (docs.to_owned(), None);
@@ -302,7 +294,6 @@ pub fn split_default(docs: &str) -> (String, Option<String>) {
     }
 }
 
-/// A sentence as it goes on after a colon.
 fn lower(sentence: &str) -> String {
     if sentence.chars().nth(1).is_none_or(|second| second.is_uppercase()) {
         return sentence.to_owned();

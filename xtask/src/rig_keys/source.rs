@@ -1,4 +1,4 @@
-//! Structs and enums with their doc comments and serde attributes.
+//! Structs and enums with doc comments and serde attributes.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -12,11 +12,10 @@ use syn::{Attribute, Expr, Fields, ImplItem, Lit, Meta, MetaList, Token, parenth
 
 use crate::rust::{self, UsedPath, Uses};
 
-/// A struct or an enum that is read from a file.
 #[derive(Clone, Debug)]
 pub struct Item {
     pub name: String,
-    /// The file that defines it. Its `use` declarations determine the types of the fields.
+    /// The `use` declarations of this file resolve the types of the fields.
     pub file: PathBuf,
     pub docs: String,
     pub serde: Serde,
@@ -40,17 +39,14 @@ pub struct Field {
 
 #[derive(Clone, Debug)]
 pub struct Variant {
-    /// As Rust has it.
     pub name: String,
     pub docs: String,
     pub is_default: bool,
-    /// Fields of its own.
     pub fields: Vec<Field>,
-    /// The one type in its parentheses.
     pub holds: Option<String>,
 }
 
-/// Arguments of `#[serde(…)]`, with their texts: `rename = "by kind"`, or `default` without one.
+/// Arguments of `#[serde(…)]`, with optional texts.
 #[derive(Clone, Debug, Default)]
 pub struct Serde(BTreeMap<String, Option<String>>);
 
@@ -75,19 +71,16 @@ impl Serde {
         Ok(Self(arguments))
     }
 
-    /// Whether an argument is there, with a text or without.
     pub fn has(&self, key: &str) -> bool {
         self.0.contains_key(key)
     }
 
-    /// Text of an argument.
     pub fn text(&self, key: &str) -> Option<String> {
         self.0.get(key).cloned().flatten()
     }
 }
 
 impl Item {
-    /// The fields, or those of the variants.
     #[cfg(test)]
     pub fn fields(&self) -> Vec<&Field> {
         match &self.shape {
@@ -97,7 +90,6 @@ impl Item {
         }
     }
 
-    /// A variant's word in files.
     pub fn word(&self, variant: &Variant) -> String {
         let style = self.serde.text("rename_all").unwrap_or_default();
         let dash = if style == "kebab-case" { "-" } else { "" };
@@ -112,22 +104,19 @@ impl Item {
     }
 }
 
-/// The types of palpate-rig, and those of the crates that it uses.
+/// Types of palpate-rig and of the crates that it uses.
 pub struct Types {
     items: Vec<Item>,
     files: BTreeMap<PathBuf, Source>,
 }
 
-/// A file that has been read.
 struct Source {
     paths: Vec<UsedPath>,
-    /// Constants, with the texts of their values.
     constants: BTreeMap<String, String>,
-    /// Bounds of quantities, with the texts of their words.
+    /// Words of bounds of quantities.
     bounds: BTreeMap<String, String>,
 }
 
-/// The crates with enums that are words in files.
 const CRATES: [&str; 5] =
     ["palpate-rig", "palpate-core", "palpate-mechanics", "palpate-estimators", "palpate-design"];
 
@@ -148,18 +137,16 @@ impl Types {
         Ok(types)
     }
 
-    /// All of them.
     pub fn all(&self) -> impl Iterator<Item = &Item> {
         self.items.iter()
     }
 
-    /// The types of palpate-rig that keys are read into.
     #[cfg(test)]
     pub fn of_rig(&self) -> impl Iterator<Item = &Item> {
         self.items.iter().filter(|item| item.file.components().any(|part| part.as_os_str() == "palpate-rig"))
     }
 
-    /// The type `name` as `file` means it: its own, or that of a crate or module that it uses.
+    /// Resolves `name` in `file`: its own type, or that of a used crate or module.
     pub fn find(&self, file: &Path, name: &str) -> Option<&Item> {
         let named = || self.items.iter().filter(|item| item.name == name);
         let own = named().find(|item| item.file == file);
@@ -176,16 +163,14 @@ impl Types {
             let first = within.clone().find(path);
             first.or_else(|| within.next())
         };
-        // What a crate hands on of another one has its own name.
+        // A re-exported type of another crate has a unique name.
         own.or_else(imported).or_else(|| named().next().filter(|_| named().count() == 1))
     }
 
-    /// The number that a constant of a file is, such as `MOST`.
     pub fn constant(&self, file: &Path, name: &str) -> Option<String> {
         Some(self.files.get(file)?.constants.get(name)?.replace('_', ""))
     }
 
-    /// The words of a bound: a text, or a constant with one.
     pub fn bound(&self, name: &str) -> Option<String> {
         let words = self.files.values().find_map(|file| file.bounds.get(name))?;
         let constant = words.rsplit("::").next()?;
@@ -239,7 +224,6 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
     Ok(())
 }
 
-/// The structs and enums of a file that derive `Deserialize`.
 fn items(path: &Path, file: &syn::File) -> Result<Vec<Item>> {
     let mut found = Vec::new();
     for item in &file.items {
@@ -281,7 +265,7 @@ fn derives_deserialize(attributes: &[Attribute]) -> bool {
     })
 }
 
-/// The attributes `name(…)`, also within `cfg_attr`.
+/// Attributes `name(…)`, also within `cfg_attr`.
 fn lists(attributes: &[Attribute], name: &str) -> Vec<MetaList> {
     let conditional = |attribute: &Attribute| {
         let metas = attribute.parse_args_with(Punctuated::<Meta, Token![,]>::parse_terminated);
@@ -325,7 +309,6 @@ fn variant(variant: &syn::Variant) -> Result<Variant> {
     })
 }
 
-/// The doc comment, its lines joined.
 fn docs(attributes: &[Attribute]) -> String {
     let line = |attribute: &Attribute| match &attribute.meta {
         Meta::NameValue(doc) if doc.path.is_ident("doc") => match &doc.value {
@@ -340,7 +323,6 @@ fn docs(attributes: &[Attribute]) -> String {
     attributes.iter().filter_map(line).collect::<Vec<_>>().join(" ")
 }
 
-/// The source of a type or an expression, in one line.
 fn source_text(node: &impl Spanned) -> String {
     let text = node.span().source_text().unwrap_or_default();
     text.split_whitespace().collect::<Vec<_>>().join(" ")

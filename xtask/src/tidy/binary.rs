@@ -1,17 +1,14 @@
-//! The repository contains text. Pictures are SVG, but for those of the manuals: PNG or WebP of limited size.
+//! Rule: files are text; pictures are SVG, or in the manuals PNG or WebP of limited size.
 
 use super::Finding;
 use super::project::{File, Project};
 
-/// Bytes at the head of a file that show whether it is text.
+/// Leading bytes that identify text.
 const HEAD: usize = 8192;
-/// Folder of the manuals' pictures.
 const IMAGES: &str = "docs/images/";
-/// Size of a picture, and of all, at most.
 const LARGEST_IMAGE: usize = 300_000;
 const ALL_IMAGES: usize = 2_000_000;
 
-/// Binary files other than pictures of the manuals, and pictures that are too large.
 pub fn findings(project: &Project) -> Vec<Finding> {
     let is_binary = |file: &&File| file.bytes.iter().take(HEAD).any(|byte| *byte == 0);
     let (images, others): (Vec<&File>, Vec<&File>) =

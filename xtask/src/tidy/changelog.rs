@@ -1,11 +1,10 @@
-//! CHANGELOG.md has a section for the workspace's version.
+//! Rule: CHANGELOG.md has a section for the workspace's version.
 
 use super::Finding;
 use super::project::Project;
 
 const CHANGELOG: &str = "CHANGELOG.md";
 
-/// A changelog that is missing, or silent about the version of a crate.
 pub fn findings(project: &Project) -> Vec<Finding> {
     let Some(file) = project.file(CHANGELOG) else {
         return vec![Finding::new(CHANGELOG, 1, "this document is missing: write it")];
@@ -20,7 +19,7 @@ pub fn findings(project: &Project) -> Vec<Finding> {
         .collect()
 }
 
-/// `## 0.1.0`, `## [0.1.0]`, with or without a date after it.
+/// Accepts `## 0.1.0` and `## [0.1.0]`, with an optional date.
 fn has_section(text: &str, version: &str) -> bool {
     let headings = text.lines().filter_map(|line| line.strip_prefix("## "));
     headings

@@ -1,8 +1,7 @@
-//! No import circle between sibling files: at every level of a crate's module tree, what a file or folder imports
-//! imports nothing of it, directly or by way of others.
+//! Rule: sibling files import each other without a circle, at every level of a crate's module tree.
 //!
-//! A child that uses its parent's own items makes no circle, nor does a parent that uses its children. A name that the
-//! parent imports from a child belongs to that child.
+//! A child may use its parent's own items, and a parent its children. A name that the parent
+//! imports from a child belongs to that child.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -10,10 +9,9 @@ use super::Finding;
 use super::project::{File, Project};
 use crate::rust::{self, UsedPath, Uses};
 
-/// A module's path from the crate's root, which is empty.
 type Name = Vec<String>;
 
-/// The modules of a crate that are files, without those of tests.
+/// Without modules of tests.
 type Modules<'a> = BTreeMap<Name, Module<'a>>;
 
 struct Module<'a> {
@@ -21,17 +19,16 @@ struct Module<'a> {
     uses: Vec<UsedPath>,
 }
 
-/// Import of one sibling by another.
 struct Import<'a> {
     file: &'a File,
     line: usize,
     item: String,
 }
 
-/// Imports between the children of one module, by importing and by imported child.
+/// By importing and by imported child of one module.
 type Siblings<'a> = BTreeMap<String, BTreeMap<String, Vec<Import<'a>>>>;
 
-/// A shortest circle through every file that lies on one.
+/// Returns a shortest circle through each file that is in one.
 pub fn findings(project: &Project) -> Vec<Finding> {
     let mut found = Vec::new();
     for root in project.crates.iter().flat_map(|krate| &krate.roots) {
@@ -50,7 +47,6 @@ pub fn findings(project: &Project) -> Vec<Finding> {
     found
 }
 
-/// Follows `mod` declarations from the root file of a crate; an error for a file that is not Rust.
 fn modules<'a>(project: &'a Project, root: &str) -> Result<Modules<'a>, Finding> {
     let mut modules = Modules::new();
     let folder = root.rsplit_once('/').map_or("", |(folder, _)| folder);
@@ -71,7 +67,6 @@ fn modules<'a>(project: &'a Project, root: &str) -> Result<Modules<'a>, Finding>
     Ok(modules)
 }
 
-/// Every import between siblings, by the module that both are children of.
 fn by_level<'a>(modules: &Modules<'a>) -> BTreeMap<Name, Siblings<'a>> {
     let mut levels = BTreeMap::<Name, Siblings>::new();
     for (from, Module { file, uses }) in modules {
@@ -90,7 +85,7 @@ fn by_level<'a>(modules: &Modules<'a>) -> BTreeMap<Name, Siblings<'a>> {
     levels
 }
 
-/// The module that a path leads to from the module that uses it, and what of the path is left; `None` outside the crate.
+/// Returns a module and the rest of the path; `None` outside the crate.
 fn resolve<'p>(modules: &Modules, from: &[String], path: &'p [String]) -> Option<(Name, &'p [String])> {
     let (mut module, mut rest) = descend(modules, from, path)?;
     while let Some((origin, is_module)) = rest.first().and_then(|name| origin(modules, &module, name)) {
@@ -100,7 +95,7 @@ fn resolve<'p>(modules: &Modules, from: &[String], path: &'p [String]) -> Option
     Some((module, rest))
 }
 
-/// The module that a path names, as if every name were defined at that path.
+/// Resolves a path literally, as if every name were defined there.
 fn descend<'p>(modules: &Modules, from: &[String], path: &'p [String]) -> Option<(Name, &'p [String])> {
     let up = path.iter().take_while(|segment| *segment == "super").count();
     let (start, rest) = match path.first()?.as_str() {
@@ -112,7 +107,6 @@ fn descend<'p>(modules: &Modules, from: &[String], path: &'p [String]) -> Option
     Some(walk(modules, start, rest))
 }
 
-/// Goes down from a module as far as a path's segments name modules.
 fn walk<'p>(modules: &Modules, mut module: Name, mut path: &'p [String]) -> (Name, &'p [String]) {
     while let Some(child) = path.first().and_then(|name| child(modules, &module, name)) {
         (module, path) = (child, &path[1..]);
@@ -125,7 +119,7 @@ fn child(modules: &Modules, parent: &[String], name: &str) -> Option<Name> {
     modules.contains_key(&child).then_some(child)
 }
 
-/// The descendant from which a module imports a name, and whether the name is that descendant's own.
+/// Returns the descendant that a name is imported from, and true if it defines the name.
 fn origin(modules: &Modules, module: &Name, name: &str) -> Option<(Name, bool)> {
     let mut imports = modules[module].uses.iter().filter(|path| path.imported.as_deref() == Some(name));
     imports.find_map(|path| {
@@ -134,12 +128,11 @@ fn origin(modules: &Modules, module: &Name, name: &str) -> Option<(Name, bool)> 
     })
 }
 
-/// A shortest circle through each file that lies on one, each once.
 fn circles(siblings: &Siblings) -> BTreeSet<Vec<String>> {
     siblings.keys().filter_map(|start| circle(siblings, start)).collect()
 }
 
-/// A shortest circle through one file, turned so that it begins with the first of its names.
+/// The circle begins with the first name in order.
 fn circle(siblings: &Siblings, start: &str) -> Option<Vec<String>> {
     let mut seen = BTreeSet::new();
     let mut open = VecDeque::from([vec![start.to_owned()]]);
@@ -157,7 +150,6 @@ fn circle(siblings: &Siblings, start: &str) -> Option<Vec<String>> {
     None
 }
 
-/// Names the files of a circle, and what each imports from the next.
 fn finding(source: &str, siblings: &Siblings, circle: &[String]) -> Finding {
     let next = circle.iter().cycle().skip(1);
     let steps: Vec<_> = circle.iter().zip(next).map(|(from, to)| (from, to, &siblings[from][to])).collect();

@@ -1,12 +1,10 @@
-//! A crate that is published holds the studies and rigs that it compiles. Each equals the one in studies or examples.
+//! Rule: studies and rigs in a published crate equal those in studies or examples.
 
 use super::Finding;
 use super::project::{File, Project};
 
-/// Folders of the originals.
 const ORIGINALS: [&str; 2] = ["studies", "examples"];
 
-/// TOML files among a crate's sources that differ from their originals, or have none.
 pub fn findings(project: &Project) -> Vec<Finding> {
     let copies = project.files.iter().filter(|file| is_copy(&file.path));
     copies.filter_map(|copy| of_copy(project, copy)).collect()

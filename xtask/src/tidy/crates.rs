@@ -1,9 +1,9 @@
-//! A crate of the workspace depends on those above it.
+//! Rule: a crate of the workspace depends on those above it only.
 
 use super::Finding;
 use super::project::{Crate, Project};
 
-/// Top to bottom: a crate may depend on those above it.
+/// From top to bottom.
 const ORDER: [&str; 17] = [
     "palpate-core",
     "palpate-files",
@@ -24,7 +24,6 @@ const ORDER: [&str; 17] = [
     "xtask",
 ];
 
-/// A dependency on a crate below, and a crate that is missing from the table.
 pub fn findings(project: &Project) -> Vec<Finding> {
     project.crates.iter().flat_map(|krate| of_crate(project, krate)).collect()
 }

@@ -1,15 +1,12 @@
-//! Rule of names in the documents: relative links, and every study and example file, exist.
+//! Rule: relative links, studies and examples in the documents exist.
 
 use super::Finding;
 use super::project::{File, Project};
 
-/// Documents that must be there.
 const REQUIRED: [&str; 4] = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md"];
 
-/// Folders with TOML files that the documents name.
 const RUNNABLE: [&str; 2] = ["studies/", "examples/"];
 
-/// A missing document, a link that leads nowhere, and a study or example that is not there.
 pub fn findings(project: &Project) -> Vec<Finding> {
     let missing = REQUIRED.into_iter().filter(|path| project.file(path).is_none());
     let missing = missing.map(|path| Finding::new(path, 1, "this document is missing: write it"));
@@ -48,7 +45,6 @@ fn of_document(project: &Project, file: &File) -> Vec<Finding> {
     found
 }
 
-/// The studies and examples that a line names.
 fn runnable(line: &str) -> impl Iterator<Item = &str> {
     let words = line.split(|character: char| !(character.is_alphanumeric() || "._-/".contains(character)));
     words
@@ -56,7 +52,7 @@ fn runnable(line: &str) -> impl Iterator<Item = &str> {
         .filter(|word| RUNNABLE.iter().any(|folder| word.starts_with(folder)) && word.ends_with(".toml"))
 }
 
-/// The targets of `[text](target "title")` and of `[label]: target`.
+/// Targets of `[text](target "title")` and of `[label]: target`.
 fn links(line: &str) -> Vec<&str> {
     let inline = line.split("](").skip(1).filter_map(|rest| rest.split_once(')')).map(|(target, _)| target);
     let defined = line.strip_prefix('[').and_then(|rest| rest.split_once("]:")).map(|(_, target)| target);
@@ -78,7 +74,7 @@ fn is_relative(target: &str) -> bool {
     !target.is_empty() && !target.starts_with('#') && !has_scheme
 }
 
-/// A path from the root, for a target beside `document`; none when it leaves the project.
+/// Resolves a target beside `document`; `None` outside the project.
 fn resolve(document: &str, target: &str) -> Option<String> {
     if target.starts_with('/') {
         return None;

@@ -1,14 +1,12 @@
-//! Nothing in the project names a place on somebody's machine, or a host that the project does not mean to name.
+//! Rule: files name only paths of every machine, and intended hosts.
 
 use super::Finding;
 use super::project::{File, Project};
 
-/// The first folders of paths that every Unix machine has, and the first parts of the live server's requests and of its topics in ROS. Any other absolute
-/// path is somebody's own.
+/// First folders of paths on every Unix machine, of the live server's requests and of ROS topics.
 const EVERYWHERE: [&str; 6] = ["api", "dev", "etc", "palpate", "proc", "usr"];
 
-/// Hosts that readers are sent to, that name a format or a licence, or that have public recordings. Packages are named, not their
-/// registries.
+/// Hosts for readers, of formats or licences, and of public recordings.
 const HOSTS: [&str; 9] = [
     "127.0.0.1",
     "creativecommons.org",
@@ -21,10 +19,9 @@ const HOSTS: [&str; 9] = [
     "www.w3.org",
 ];
 
-/// Files that package managers write, which name the registries they use.
+/// Files of package managers, which name registries.
 const LOCKS: [&str; 3] = ["Cargo.lock", "package-lock.json", "uv.lock"];
 
-/// A machine's path in any file, and an unknown host outside lock files.
 pub fn findings(project: &Project) -> Vec<Finding> {
     project.files.iter().filter(|file| !file.is_a_rule()).flat_map(of_file).collect()
 }
@@ -45,7 +42,7 @@ fn of_file(file: &File) -> Vec<Finding> {
     found
 }
 
-/// The first folder of every absolute path that begins a word and is not on every machine.
+/// First folders of other absolute paths.
 fn own_paths(line: &str) -> impl Iterator<Item = &str> {
     line.match_indices('/').filter_map(|(at, _)| {
         let before = line[..at].chars().next_back();
@@ -58,7 +55,6 @@ fn own_paths(line: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// The host of every address of the web.
 fn hosts(line: &str) -> impl Iterator<Item = &str> {
     let after = line
         .match_indices("://")

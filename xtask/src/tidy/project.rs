@@ -1,4 +1,4 @@
-//! The project as the rules see it: its files' text and its crates' dependencies, read once.
+//! Files and crates of the project.
 
 use std::borrow::Cow;
 use std::fs;
@@ -8,45 +8,36 @@ use std::process::Command;
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
-/// Every file that git tracks or would add, and every crate of the workspace.
+/// Files that git tracks or would add, and crates of the workspace.
 pub struct Project {
     /// In order of path.
     pub files: Vec<File>,
-    /// In the order of `cargo metadata`.
     pub crates: Vec<Crate>,
 }
 
-/// A file with its path from the root, parted by `/`.
+/// A file with a path from the root, separated by `/`.
 pub struct File {
-    /// From the root.
     pub path: String,
-    /// As on disk.
     pub bytes: Vec<u8>,
 }
 
-/// A crate of the workspace.
 #[derive(Default)]
 pub struct Crate {
-    /// The package name.
     pub name: String,
-    /// The version.
     pub version: String,
-    /// The Cargo.toml, from the root.
     pub manifest: String,
-    /// The root files of its library and binaries, from the root.
+    /// Root files of the library and the binaries.
     pub roots: Vec<String>,
-    /// The packages that it depends on, for whatever purpose.
     pub dependencies: Vec<String>,
 }
 
 impl Project {
-    /// Reads the work tree at `root`.
     pub fn read(root: &Path) -> Result<Self> {
         let mut files = Vec::new();
         let listed = output(root, "git", &["ls-files", "-z", "--cached", "--others", "--exclude-standard"])?;
         for path in listed.split(|&byte| byte == 0).map(String::from_utf8_lossy) {
             let full = root.join(&*path);
-            // A file may be deleted and not yet committed so.
+            // A deleted file may still be in the index.
             if full.is_file() {
                 let bytes = fs::read(&full).with_context(|| format!("cannot read {}", full.display()))?;
                 files.push(File { path: path.into_owned(), bytes });
@@ -60,12 +51,10 @@ impl Project {
         Ok(Self { files, crates: crates(&metadata) })
     }
 
-    /// The file at a path from the root.
     pub fn file(&self, path: &str) -> Option<&File> {
         self.files.iter().find(|file| file.path == path)
     }
 
-    /// Whether a path from the root is a file or a folder of the project.
     pub fn has(&self, path: &str) -> bool {
         let inside = |file: &File| file.path.strip_prefix(path).is_some_and(|rest| rest.starts_with('/'));
         path.is_empty() || self.file(path).is_some() || self.files.iter().any(inside)
@@ -73,12 +62,11 @@ impl Project {
 }
 
 impl File {
-    /// The file as text.
     pub fn text(&self) -> Cow<'_, str> {
         String::from_utf8_lossy(&self.bytes)
     }
 
-    /// Whether it is one of the rules' own files, which must name what they forbid.
+    /// The rules' own files must name the forbidden text.
     pub fn is_a_rule(&self) -> bool {
         self.path.starts_with("xtask/src/tidy/")
     }
@@ -110,7 +98,6 @@ fn crates(metadata: &Value) -> Vec<Crate> {
     list(&metadata["packages"]).map(of).collect()
 }
 
-/// A library or a binary, as against a test, an example, a benchmark or a build script.
 fn is_shipped(target: &Value) -> bool {
     list(&target["kind"]).any(|kind| text(kind).ends_with("lib") || text(kind) == "bin")
 }
@@ -125,7 +112,6 @@ fn text(value: &Value) -> String {
 
 #[cfg(test)]
 impl Project {
-    /// A project of these files alone.
     pub fn from_files(files: &[(&str, &str)]) -> Self {
         let file = |&(path, text): &(&str, &str)| File { path: path.into(), bytes: text.into() };
         Self { files: files.iter().map(file).collect(), crates: Vec::new() }

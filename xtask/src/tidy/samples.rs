@@ -1,14 +1,12 @@
-//! Samples in the command's package are the project's examples.
+//! Rule: samples in the command's package equal the project's examples.
 
 use super::Finding;
 use super::project::Project;
 
 /// Folder of the copies: a package contains its own files only.
 const SAMPLES: &str = "crates/palpate-cli/samples/";
-/// Folders of the originals.
 const ORIGINALS: [&str; 2] = ["examples/", "examples/data/"];
 
-/// A sample that differs from its original, or has none.
 pub fn findings(project: &Project) -> Vec<Finding> {
     let mut findings = Vec::new();
     for sample in &project.files {

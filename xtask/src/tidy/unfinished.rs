@@ -1,4 +1,4 @@
-//! Rule of what is left undone: a marker carries its reason.
+//! Rule: a marker of unfinished work has a reason.
 
 use super::Finding;
 use super::project::{File, Project};
@@ -6,13 +6,11 @@ use crate::rust;
 
 const MARKERS: [&str; 2] = ["TODO", "FIXME"];
 
-/// Files with text, comments included, that may contain markers.
 const TEXT: [&str; 7] = [".ts", ".py", ".css", ".sh", ".toml", ".c", ".md"];
 
-/// Markers without a reason.
 pub fn findings(project: &Project) -> Vec<Finding> {
     let mut found = Vec::new();
-    // Lexing every file takes seconds; most have no marker at all.
+    // Lexing every file takes seconds; most have no marker.
     let has_marker = |file: &&File| MARKERS.iter().any(|marker| file.text().contains(marker));
     for file in project.files.iter().filter(|file| !file.is_a_rule()).filter(has_marker) {
         if file.path.ends_with(".rs") {

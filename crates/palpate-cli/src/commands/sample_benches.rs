@@ -1,6 +1,6 @@
 //! `palpate init --example`: a rig with data and the next commands.
 //!
-//! `samples` holds copies of files of the project's `examples`, as a package contains its own files
+//! `samples` contains copies of files of the project's `examples`, as a package contains its own files
 //! only; `cargo xtask tidy` compares them. Benches with a model have simulated data with fixed
 //! seeds.
 

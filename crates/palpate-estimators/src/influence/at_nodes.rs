@@ -1,27 +1,26 @@
-//! Influence functions at the nodes of a locator's table, as the presses told them.
+//! Learnt influence functions at the nodes of a locator's table.
 
 use super::channels::Channels;
 use palpate_mechanics::contact::Position;
 
-/// Influence functions of the channels in use, with their uncertainty, at the nodes of a locator's table.
+/// Influence functions of the channels in use at the nodes of a locator's table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InfluencesAtNodes {
     /// Positions of the nodes.
     pub positions: Vec<Position>,
-    /// The channels in use, from 0.
+    /// Indices of the channels in use, from 0.
     pub channels: Vec<usize>,
-    /// Offset of each of them, in its SI unit or raw.
+    /// Offset of each channel in use, in its SI unit or raw.
     pub offsets: Vec<f64>,
-    /// Standard deviation of the noise of each of them.
+    /// Standard deviation of the noise of each channel in use.
     pub noise_sd: Vec<f64>,
-    /// Reading per newton, less the offset: positions × channels in use.
+    /// Reading per newton, positions × channels in use.
     pub values: Vec<f64>,
-    /// Standard deviation of the values, from calibrating with finitely many noisy presses: positions × channels in use.
+    /// Posterior standard deviation of the values, positions × channels in use.
     pub sd: Vec<f64>,
 }
 
 impl InfluencesAtNodes {
-    /// The functions of a table of all channels, nodes × channels, of which some are in use.
     pub(super) fn of_table(
         positions: Vec<Position>,
         channels: &Channels,

@@ -1,4 +1,4 @@
-//! The channels of a locator with a model, besides their influence functions.
+//! Parameters of the channels of a locator with a model, besides the influence functions.
 
 use super::config::ForceBelief;
 use crate::fit::LocatorFault;
@@ -6,8 +6,6 @@ use crate::force_prior::{DECADE, ForceRange};
 use crate::status::FalseAlarmRate;
 use serde::{Deserialize, Serialize};
 
-/// Offsets, noise and reference force of the channels, learnt besides their influence functions, and how rarely their noise is to be
-/// taken for a contact.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Channels {
@@ -15,45 +13,41 @@ pub(super) struct Channels {
     pub offsets: Vec<f64>,
     /// Noise of each channel, in its SI unit.
     pub noise_sd: Vec<f64>,
-    /// Which channels are left out.
     pub dead: Vec<bool>,
-    /// Mean force of the calibration, in newtons.
+    /// Mean force of the calibration.
     pub reference_force_n: f64,
-    /// Greatest force of contacts of unknown force, in newtons, where it was said.
+    /// Stated upper bound of an unknown force.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub greatest_force_n: Option<f64>,
-    /// Least force of contacts of unknown force, in newtons, where it was said.
+    /// Stated lower bound of an unknown force.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub least_force_n: Option<f64>,
-    /// Share of untouched readings that may be taken for a contact.
     #[serde(default)]
     pub false_alarm_rate: FalseAlarmRate,
 }
 
 impl Channels {
-    /// The channels in use, from 0.
     pub fn live(&self) -> Vec<usize> {
         (0..self.dead.len()).filter(|s| !self.dead[*s]).collect()
     }
 
-    /// Noise of each channel, in its SI unit; `None` of those that are left out.
     pub fn noise_in_use(&self) -> Vec<Option<f64>> {
         self.noise_sd.iter().zip(&self.dead).map(|(sd, dead)| (!dead).then_some(*sd)).collect()
     }
 
-    /// The greatest force of contacts of unknown force, in newtons: as it was said, or a multiple of the calibration's.
+    /// Upper bound of an unknown force: as stated, or [`DECADE`] times the calibration's.
     pub fn greatest_force_n(&self) -> f64 {
         self.greatest_force_n.unwrap_or(DECADE * self.reference_force_n)
     }
 
-    /// Range of the forces of contacts of unknown force: as it was stated, or a decade either side of the calibration's.
+    /// Range of an unknown force: as stated, or a decade on either side of the calibration's.
     pub fn force_range(&self) -> Option<ForceRange> {
         let greatest_n = self.greatest_force_n();
         let of_calibration = || (self.reference_force_n / DECADE).min(greatest_n / DECADE);
         ForceRange::new(self.least_force_n.unwrap_or_else(of_calibration), greatest_n).ok()
     }
 
-    /// The same without channel `channel` (from 0); `None` when no channel would be left.
+    /// Disables a channel; `None` when no channel would remain.
     pub fn without(&self, channel: usize) -> Option<Self> {
         let mut channels = self.clone();
         if let Some(dead) = channels.dead.get_mut(channel) {
@@ -62,10 +56,10 @@ impl Channels {
         channels.dead.contains(&false).then_some(channels)
     }
 
-    /// Checks what a file may have got wrong of `sensors` channels, and of what is known of the force.
+    /// Checks the values of a locator file.
     ///
     /// # Errors
-    /// [`LocatorFault`] for a list of another length, a number out of its bounds, or when no channel lives.
+    /// [`LocatorFault`] for a wrong length, a number out of bounds, or no channel in use.
     pub fn check(&self, sensors: usize, force: ForceBelief) -> Result<(), LocatorFault> {
         let count = LocatorFault::check_count;
         count("offsets", sensors, self.offsets.len())?;

@@ -1,42 +1,43 @@
-//! A grid of places.
+//! Axes of a grid of places.
 
 use crate::fit::LocatorFault;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use std::ops::RangeInclusive;
 
-/// Least nodes along a line: what few presses leave open rises and falls between two of them, which cubics over a node or two a press miss.
+/// With few calibration rows the posterior variance peaks between neighbouring places, which a coarser grid
+/// misses.
 const LEAST_ALONG_LINE: usize = 60;
-/// Least nodes of any other axis, those of a cubic.
+/// Nodes of a cubic.
 const LEAST_NODES: usize = 4;
 
 /// Evenly spaced nodes.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Axis {
-    /// The first node.
+    /// Coordinate of the first node.
     pub start: f64,
-    /// From one node to the next; greater than 0.
+    /// Distance between neighbouring nodes, greater than 0.
     pub step: f64,
-    /// Nodes; at least 1.
+    /// Number of nodes, at least 1.
     pub count: usize,
-    /// Nodes at either end where contacts are less likely, the nearer the end the less.
+    /// Width of the margins at both ends, in nodes; there the prior density falls.
     #[serde(default)]
     pub margins: [f64; 2],
 }
 
 impl Axis {
-    /// A coordinate that does not vary.
+    /// Coordinate that does not vary.
     pub const NONE: Self = Self { start: 0.0, step: 1.0, count: 1, margins: [0.0; 2] };
 
-    /// Nodes over the span of `values`, and half their largest gap beyond at either end; about two nodes for every distinct value, and at
-    /// least `per_length` a `length`, but no more than `most`.
+    /// Places nodes over `values` and half their largest gap beyond: about two per distinct value, at least 8
+    /// per `length`, at most `most`.
     pub fn over(values: Vec<f64>, length: f64, most: usize) -> Self {
         Self::beyond(values, 0.5, (f64::NEG_INFINITY, f64::INFINITY), length, LEAST_NODES..=most)
     }
 
-    /// The same of positions along a side of so many metres: beyond half the largest gap, contacts are less likely up to the whole gap, but
-    /// nowhere beyond the side's ends. The side is number `k` of the extent's.
+    /// Places nodes over positions along side `k` and one largest gap beyond; the outer half of that gap is a
+    /// margin.
     pub fn of_positions(
         positions_m: Vec<f64>,
         (extent, k): (Extent, usize),
@@ -50,7 +51,6 @@ impl Axis {
         Self::beyond(positions_m, 1.0, (0.0, sides_m[k]), length_m, least..=most)
     }
 
-    /// Nodes up to so many gaps beyond the values.
     fn beyond(
         mut values: Vec<f64>,
         gaps: f64,
@@ -58,7 +58,7 @@ impl Axis {
         length: f64,
         nodes: RangeInclusive<usize>,
     ) -> Self {
-        /// Nodes a length scale: linear and cubic interpolation between them is then better than the noise.
+        /// Interpolation errors are then below the noise.
         const PER_LENGTH: f64 = 8.0;
         values.sort_by(f64::total_cmp);
         values.dedup();
@@ -67,7 +67,7 @@ impl Axis {
         let within = |value: f64| value.clamp(bounds.0, bounds.1);
         let ends = |gaps: f64| (within(first - gaps * gap), within(last + gaps * gap));
         let ((from, to), usual) = (ends(gaps), ends(0.5));
-        // One value alone, or none that differ by more than rounding.
+        // One value alone, or values that differ only by rounding.
         if (to - from).is_nan() || to - from <= 1e-9 * (from.abs() + to.abs()) {
             return Self { start: *first, ..Self::NONE };
         }
@@ -79,7 +79,7 @@ impl Axis {
         Self { start: from, step, count, margins: [(usual.0 - from) / step, (to - usual.1) / step] }
     }
 
-    /// The same span with `factor` times the nodes, but no more than `most`; unchanged where that is no more.
+    /// Refines the axis to `factor` times the nodes, at most `most`.
     pub(super) fn finer(self, factor: f64, most: usize) -> Self {
         let wanted = (self.count as f64 * factor).ceil().min(most as f64) as usize;
         if self.count < 2 || wanted <= self.count {
@@ -91,19 +91,17 @@ impl Axis {
         Self { step, count: wanted, margins, ..self }
     }
 
-    /// The coordinate at `place`, in nodes from the first.
+    /// Returns the coordinate at `place`, in nodes from the first.
     pub fn value(&self, place: f64) -> f64 {
         self.start + self.step * place
     }
 }
 
-/// True of a place, in nodes, in a margin.
 pub(super) fn is_margin(axes: [Axis; 2], place: [f64; 2]) -> bool {
     (0..2).any(|k| axes[k].margin_cost(place[k]) > 0.0)
 }
 
-/// Greatest of a distance from a place to its two neighbours along, and across; `distance` is asked for the neighbour's number. Place (x, y) of a grid is
-/// number x·count_y + y.
+/// Place (x, y) has the index x·count_y + y.
 pub(super) fn greatest_distances(
     [x, y]: [Axis; 2],
     place: usize,
@@ -116,8 +114,7 @@ pub(super) fn greatest_distances(
 }
 
 impl Axis {
-    /// −2·ln of how much less likely a contact at `place`, in nodes, is than one in the middle: in a margin it falls exponentially, to a tenth at
-    /// the end.
+    /// −2·ln of the relative prior density: in a margin it falls exponentially, to a tenth at the end.
     pub(super) fn margin_cost(&self, place: f64) -> f64 {
         const FALL: f64 = 2.0 * std::f64::consts::LN_10;
         let within =
@@ -126,7 +123,6 @@ impl Axis {
     }
 }
 
-/// Checks what a file may have got wrong of axes.
 pub(super) fn check_axes(axes: &[Axis]) -> Result<(), LocatorFault> {
     let counts = axes.iter().map(|axis| axis.count as f64);
     LocatorFault::check_numbers("axis count", counts, |count| count >= 1.0, "at least 1")?;
@@ -137,7 +133,6 @@ pub(super) fn check_axes(axes: &[Axis]) -> Result<(), LocatorFault> {
     LocatorFault::check_numbers("axis margin", margins, |margin| margin >= 0.0, "finite and at least 0")
 }
 
-/// The position in the middle of a grid.
 pub(super) fn middle([x, y]: [Axis; 2]) -> Position {
     let middle = |axis: Axis| axis.value(0.5 * (axis.count - 1) as f64);
     Position { x_m: middle(x), y_m: middle(y) }

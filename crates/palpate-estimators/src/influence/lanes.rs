@@ -1,20 +1,18 @@
-//! Channels in groups of eight, which are worked on side by side.
+//! Groups of eight channels for vector instructions.
 
 use palpate_numerics::simd::Eight;
 
-/// Channels of a group.
 pub(super) const LANES: usize = 8;
 
-/// Numbers of a group of channels.
 pub(super) type Lanes = [f64; LANES];
 
-/// Numbers in groups, the last filled up with zeros.
+/// Groups `numbers`; zeros pad the last group.
 pub(super) fn in_lanes(numbers: &[f64]) -> Vec<Lanes> {
     let group = |numbers: &[f64]| std::array::from_fn(|l| numbers.get(l).copied().unwrap_or(0.0));
     numbers.chunks(LANES).map(group).collect()
 }
 
-/// The sum over the channels, in pairs: no addition waits for more than two others.
+/// Sum over the channels, added in pairs for a short dependency chain.
 #[inline(always)]
 pub(super) fn sum_of<V: Eight<Real = f64>>(lanes: V) -> f64 {
     let [a, b, c, d, e, f, g, h] = lanes.to_array();

@@ -1,8 +1,7 @@
-//! From presses to what every sensor reads at given places, on a line as on a plane.
+//! Posterior of the influence functions given the calibration rows.
 //!
-//! Every sensor's influence function is a Gaussian process (its prior: see [`super::prior`]); presses at the same place with the
-//! same force are averaged, the hyperparameters that sensors of one kind share are those under which the presses are the most
-//! probable, and the posterior is asked for mean and variance at the places.
+//! Rows of one place and force are averaged. Sensors of one kind share the hyperparameters, which maximize
+//! the log evidence of the Gaussian processes of [`super::prior`].
 
 use super::channels::Channels;
 use super::config::{Influence, InfluenceFitError, InfluenceSource};
@@ -18,7 +17,6 @@ use palpate_mechanics::surface::Surface;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{Cholesky, NotPositiveDefinite, mean};
 
-/// One sensor's influence function as the presses tell it, at the places that were asked for.
 pub(super) struct LearntInfluence<'s, 'a> {
     posterior: Posterior<'s, 'a>,
     prior: &'s Prior<'a>,
@@ -27,13 +25,12 @@ pub(super) struct LearntInfluence<'s, 'a> {
 }
 
 impl LearntInfluence<'_, '_> {
-    /// The reading per newton at place number `place`.
+    /// Posterior mean of the reading per newton.
     pub fn mean(&self, place: usize) -> f64 {
         let parts = self.prior.parts(self.places[place]);
         self.posterior.mean(parts, &self.remainders.places.row(place))
     }
 
-    /// Variance, from calibrating with finitely many noisy presses.
     pub fn variance(&self, place: usize) -> f64 {
         let parts = self.prior.parts(self.places[place]);
         let (row, own) = (self.remainders.places.row(place), self.remainders.own[place]);
@@ -41,13 +38,13 @@ impl LearntInfluence<'_, '_> {
     }
 }
 
-/// Nodes of a table that are filled between two looks whether to go on.
+/// Nodes filled per check of the watch.
 pub(super) const NODES_EACH: usize = 16;
 
-/// Consumer of the learnt influence function of a sensor, whose number comes first.
+/// Consumer of a sensor's index and influence function.
 pub(super) type Take<'t> = dyn FnMut(usize, &LearntInfluence) -> Result<(), Cancelled> + 't;
 
-/// Learns the influence functions of all living sensors at `places`, and hands each, with the sensor's number, to `take`.
+/// Learns the influence functions of all enabled sensors at `places`.
 pub(super) fn learn(
     Influence { source, false_alarm_rate, .. }: Influence,
     task: FitTask,
@@ -61,7 +58,7 @@ pub(super) fn learn(
     let presses = Presses::of_recording(task.recording, untouched.as_ref())?;
     let needed = match (source, surface.extent().dimensions()) {
         (InfluenceSource::Recording, 1) => 3,
-        // A plane's simplest curved surface has six numbers.
+        // A quadratic surface has six coefficients.
         (InfluenceSource::Recording, _) => 6,
         _ => 1,
     };
@@ -103,7 +100,6 @@ fn check_sensors(layout: &Layout) -> Result<(), InfluenceFitError> {
     Ok(())
 }
 
-/// Task of learning: source, presses, and the places to learn at.
 struct Learning<'a> {
     source: InfluenceSource,
     surface: &'a dyn Surface,
@@ -113,7 +109,6 @@ struct Learning<'a> {
 }
 
 impl<'a> Learning<'a> {
-    /// Learns the sensors of one kind, which share their hyperparameters.
     fn learn_kind(
         &self,
         kind: SensorKind,
@@ -137,7 +132,7 @@ impl<'a> Learning<'a> {
         let searched: Vec<SensorPresses> =
             priors.iter().zip(living).map(|sensor| with(sensor, &few)).collect();
         let noise_is_told = living.iter().all(|s| presses.noise_variance(layout, *s).is_some());
-        // A reaction of presses of one force may be an offset as well as an influence, which no support holds at 0 everywhere.
+        // Rows of one force confound offset and influence of a reaction: no support makes it 0 everywhere.
         let has_one_force = is_one_force(presses.touching().map(|press| press.force_n));
         let offset_is_open = has_one_force && !presses.is_untouched();
         let is_reaction_alone = mean == Mean::Zero && kind == SensorKind::Reaction && offset_is_open;
@@ -160,35 +155,33 @@ impl<'a> Learning<'a> {
     }
 }
 
-/// Presses at one position with one force, or the untouched rows, whose force is 0.
+/// Mean of the rows of one position and force; untouched rows have force 0.
 #[derive(Clone, Debug, PartialEq)]
 struct Press {
     pub position: Position,
     pub force_n: f64,
-    /// Variance of the noise of a reading over that of the mean: the number of readings that were averaged, or less where their offsets are uncertain.
+    /// Noise variance of one reading over that of the mean.
     pub count: f64,
-    /// Their mean, a value a sensor.
     pub mean: Vec<f64>,
 }
 
-/// All presses of a recording, and how much repeats disagree.
 #[derive(Clone, Debug, PartialEq)]
 struct Presses {
     pub presses: Vec<Press>,
-    /// Sum of squared deviations of repeats from their mean, a value a sensor.
+    /// Squared deviations of repeats, per sensor.
     scatter: Vec<f64>,
-    /// Degrees of freedom of the scatter: readings less presses.
+    /// Readings minus means.
     freedom: f64,
 }
 
-/// Weight of the rig's stated noise beside the repeats, in readings.
+/// Weight of the rig's stated noise, in readings.
 const STATED_FREEDOM: f64 = 20.0;
 
 impl Presses {
-    /// The presses of a recording, no more than can be learnt from, and its untouched rows as one of force 0, by which the offsets of all are known.
+    /// Averages and thins the rows of a recording; untouched rows become one row of force 0.
     ///
     /// # Errors
-    /// [`InfluenceFitError::NoForce`] for a row whose force nobody knows, or is not greater than 0.
+    /// [`InfluenceFitError::NoForce`] for a row without a force greater than 0.
     pub fn of_recording(
         recording: &Recording,
         untouched: Option<&UntouchedRows>,
@@ -207,7 +200,6 @@ impl Presses {
         Ok(presses)
     }
 
-    /// Averages repeats of rows, each with the variance of its reading over that of the noise.
     fn average(recording: &[(Row, f64)]) -> Result<Self, InfluenceFitError> {
         let sensors = recording.first().map_or(0, |(row, _)| row.reading.len());
         let mut rows: Vec<(Position, f64, &[f64], f64)> = Vec::with_capacity(recording.len());
@@ -233,40 +225,36 @@ impl Presses {
         Ok(Self { presses, scatter, freedom })
     }
 
-    /// Evenly picked, no more than `most`; the scatter of repeats stays that of all.
     fn thinned(self, most: usize) -> Self {
         let presses = thinned(self.presses.len(), most).map(|i| self.presses[i].clone()).collect();
         Self { presses, ..self }
     }
 
-    /// Indices of those that the search looks at: the untouched rows are always among them.
+    /// Indices for the search, always with the untouched rows.
     fn few(&self) -> Vec<usize> {
         let touching = self.touching().count();
         thinned(touching, MOST_PRESSES).chain(touching..self.presses.len()).collect()
     }
 
-    /// Those in which something touched.
     fn touching(&self) -> impl Iterator<Item = &Press> {
         self.presses.iter().filter(|press| press.force_n > 0.0)
     }
 
-    /// True where the untouched surface was recorded too.
     fn is_untouched(&self) -> bool {
         self.presses.iter().any(|press| press.force_n == 0.0)
     }
 
-    /// Number of positions, whatever the force.
     pub fn distinct_positions(&self) -> usize {
         self.presses.chunk_by(|a, b| a.position == b.position).count()
     }
 
-    /// The mean force of presses, in newtons.
     pub fn mean_force_n(&self) -> f64 {
         mean(self.touching().map(|press| press.force_n))
     }
 
-    /// The variance of a sensor's noise from its repeats and the noise that its rig states, or `None` where neither
-    /// says anything. Quantisation to steps q adds q²/12 where there are no repeats that show it.
+    /// Variance of a sensor's noise from repeats and the rig's statement; `None` without either.
+    ///
+    /// Quantization to steps q adds q²/12 to the stated variance.
     pub fn noise_variance(&self, layout: &Layout, sensor: usize) -> Option<f64> {
         let channel = &layout.sensors()[sensor].channel;
         let stated = channel.noise_sd.powi(2) + channel.resolution.powi(2) / 12.0;
@@ -276,27 +264,24 @@ impl Presses {
     }
 }
 
-/// Sharpens no posterior beyond what f64 can hold: variance of a reading, relative to the full-scale reading squared.
+/// Least variance relative to full scale squared, for posteriors within the precision of f64.
 const FLOOR: f64 = 1e-18;
 
-/// One sensor's presses, with all that does not depend on the hyperparameters worked out once.
 struct SensorPresses<'a> {
     pub prior: Prior<'a>,
     force_n: Vec<f64>,
     count: Vec<f64>,
     parts: Vec<Parts>,
-    /// Mean reading less the prior's mean.
+    /// Mean reading minus the prior's mean.
     residual: Array1<f64>,
-    /// Covariance of the remainders of every pair of presses.
     remainder: Array2<f64>,
-    /// The reading's noise variance, where repeats or the rig tell it.
+    /// Noise variance, where repeats or the rig determine it.
     noise: Option<f64>,
-    /// The full-scale reading at the mean force.
+    /// Full-scale reading at the mean force.
     scale: f64,
     mean_force_n: f64,
 }
 
-/// The posterior of one sensor's influence function.
 struct Posterior<'s, 'a> {
     presses: &'s SensorPresses<'a>,
     hyper: Hyperparameters,
@@ -305,7 +290,6 @@ struct Posterior<'s, 'a> {
 }
 
 impl<'a> SensorPresses<'a> {
-    /// Sensor number `index` of the presses, of which those numbered `kept` are looked at; `remainder` is of all.
     pub fn new(
         prior: Prior<'a>,
         presses: &Presses,
@@ -334,7 +318,6 @@ impl<'a> SensorPresses<'a> {
         }
     }
 
-    /// The variance of a reading's noise.
     pub fn noise_variance(&self, hyper: &Hyperparameters) -> f64 {
         let least = FLOOR * self.scale * self.scale;
         self.noise.unwrap_or((hyper.noise * self.scale).powi(2)).max(least)
@@ -344,7 +327,6 @@ impl<'a> SensorPresses<'a> {
         (hyper.offset * self.scale).powi(2)
     }
 
-    /// Covariance of the mean readings of all presses.
     fn covariance(&self, hyper: &Hyperparameters) -> Array2<f64> {
         let (offset, noise) = (self.offset_variance(hyper), self.noise_variance(hyper));
         let n = self.parts.len();
@@ -360,17 +342,13 @@ impl<'a> SensorPresses<'a> {
         covariance
     }
 
-    /// ln of the probability density of the presses, less a constant; −∞ where it cannot be computed.
+    /// Log evidence without its constant; −∞ where the covariance cannot be factored.
     pub fn log_evidence(&self, hyper: &Hyperparameters) -> f64 {
         let Ok(cholesky) = Cholesky::factor(self.covariance(hyper)) else { return f64::NEG_INFINITY };
         let whitened = cholesky.solve_lower(&self.residual);
         -0.5 * (whitened.dot(&whitened) + cholesky.log_determinant())
     }
 
-    /// The posterior.
-    ///
-    /// # Errors
-    /// [`NotPositiveDefinite`] when the presses' covariance cannot be factored.
     pub fn posterior(&self, hyper: Hyperparameters) -> Result<Posterior<'_, 'a>, NotPositiveDefinite> {
         let cholesky = Cholesky::factor(self.covariance(&hyper))?;
         let weights = cholesky.solve(&self.residual);
@@ -379,13 +357,10 @@ impl<'a> SensorPresses<'a> {
 }
 
 impl Posterior<'_, '_> {
-    /// The posterior mean of the offset.
     pub fn offset(&self) -> f64 {
         self.presses.offset_variance(&self.hyper) * self.weights.sum()
     }
 
-    /// Covariance of the influence with each press's reading, of the influence alone; `remainders` are those of the
-    /// place with the presses.
     fn with_presses(&self, at: Parts, remainders: &ArrayView1<f64>) -> Array1<f64> {
         let SensorPresses { prior, parts, force_n, .. } = self.presses;
         let presses = parts.iter().zip(force_n).zip(remainders);
@@ -395,13 +370,11 @@ impl Posterior<'_, '_> {
         presses.map(covariance).collect()
     }
 
-    /// The posterior mean of the influence.
     pub fn mean(&self, at: Parts, remainders: &ArrayView1<f64>) -> f64 {
         self.presses.prior.mean(at) + self.with_presses(at, remainders).dot(&self.weights)
     }
 
-    /// The posterior variance of the influence and of the offset shared over the mean force; `own` is the remainder's
-    /// covariance of the place with itself.
+    /// Posterior variance of influence plus offset/mean force; `own` is the remainder's variance.
     pub fn variance(&self, at: Parts, remainders: &ArrayView1<f64>, own: f64) -> f64 {
         let force_n = self.presses.mean_force_n;
         let offset = self.presses.offset_variance(&self.hyper);
@@ -412,29 +385,25 @@ impl Posterior<'_, '_> {
     }
 }
 
-/// Presses that the search looks at; more would cost time and change little.
+/// More rows change the hyperparameters little.
 const MOST_PRESSES: usize = 60;
 
-/// Presses that the functions are learnt from: a calibration that errs by this much less than a reading adds less than a hundredth to the
-/// error, while time and memory grow with the cube and the square of the presses.
+/// The error of such a calibration adds less than 1 % to that of a reading; time grows with the cube of the
+/// rows.
 pub(crate) const MOST_LEARNT: usize = 800;
 
-/// log₁₀ of the five spreads, with the bounds of each. The lower bounds mean "not at all".
+/// Starts and bounds of log₁₀ of the hyperparameters; the lower bounds mean 0.
 const START: [f64; 5] = [-2.0, -3.0, -3.0, -4.0, -4.0];
 const LOWEST: [f64; 5] = [-6.0, -8.0, -7.0, -9.0, -9.0];
 const HIGHEST: [f64; 5] = [0.0, -1.0, 2.0, 0.0, 0.0];
 
-/// Hyperparameters that are not to be found.
 #[derive(Clone, Copy)]
 struct Told {
-    /// The noise follows from repeats or by the rig.
     noise: bool,
-    /// Offsets are 0.
     offset: bool,
 }
 
-/// The hyperparameters under which the presses of all `sensors`, which are of one kind, are the most probable: steps along one
-/// logarithm at a time, ever smaller.
+/// Maximizes the log evidence by coordinate ascent in the logarithms.
 fn most_probable(
     sensors: &[SensorPresses],
     mean: Mean,
@@ -489,7 +458,6 @@ fn most_probable(
     Ok(hyper(&logs))
 }
 
-/// Steps along each free logarithm while the evidence rises.
 fn climb(
     logs: &mut [f64; 5],
     best: &mut f64,

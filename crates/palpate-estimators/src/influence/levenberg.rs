@@ -1,4 +1,5 @@
-//! Levenberg's steps down the misfit of a contact (K. Levenberg, Quart. Appl. Math. 2, 1944, with Marquardt's scaling by the diagonal).
+//! Levenberg–Marquardt steps for a contact (K. Levenberg, Quart. Appl. Math. 2, 1944, with Marquardt's
+//! scaling by the diagonal).
 
 use super::lanes::{LANES, Lanes, sum_of};
 use crate::force_prior::PriorTerms;
@@ -6,10 +7,9 @@ use palpate_numerics::simd::{Eight, InstructionSet, Kernel, Simd, Vector};
 use palpate_numerics::small::{Ldl, Matrix};
 use palpate_numerics::with_shared_error;
 
-/// Position along and across, and the force or whatever else a reading depends on.
 pub(super) type Unknowns = [f64; 3];
 
-/// JᵀV⁻¹J and JᵀV⁻¹e of some unknowns, V the variances, e the residual and J the reading's derivatives.
+/// Normal equations JᵀV⁻¹J and JᵀV⁻¹e: variances V, residual e, derivatives J of the reading.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Equations {
     /// eᵀV⁻¹e.
@@ -19,12 +19,11 @@ pub(super) struct Equations {
 }
 
 impl Equations {
-    /// From the weights V⁻¹, the residual and the derivatives of groups of channels.
     pub fn new(channels: impl Iterator<Item = (Lanes, Lanes, [Lanes; 3])>) -> Self {
         InstructionSet::best().run(SumGroups { channels })
     }
 
-    /// With errors g that the channels share besides: by V + g·gᵀ in place of V, from the same groups of channels and g.
+    /// Replaces V by V + g·gᵀ for common-mode errors g.
     pub fn with_shared_errors(
         mut self,
         channels: impl Iterator<Item = ((Lanes, Lanes, [Lanes; 3]), Lanes)>,
@@ -48,7 +47,6 @@ impl Equations {
         self
     }
 
-    /// With a prior of the last unknown.
     pub fn with_prior(mut self, PriorTerms { cost, slope, precision }: PriorTerms) -> Self {
         self.misfit += cost;
         self.right[2] -= slope;
@@ -76,7 +74,6 @@ impl<I: Iterator<Item = (Lanes, Lanes, [Lanes; 3])>> Kernel for SumGroups<I> {
     }
 }
 
-/// Products of weights, residuals and derivatives, eight channels side by side.
 pub(super) struct EquationSums<V>([V; 10]);
 
 impl<V: Eight<Real = f64>> EquationSums<V> {
@@ -85,7 +82,6 @@ impl<V: Eight<Real = f64>> EquationSums<V> {
         Self([V::splat(0.0); 10])
     }
 
-    /// With the weights V⁻¹, the residual and the derivatives of eight channels more.
     #[inline(always)] // Compiled for the instructions of its caller.
     pub fn add(&mut self, weights: V, e: V, [x, y, t]: [V; 3]) {
         let [we, wx, wy] = [weights * e, weights * x, weights * y];
@@ -111,11 +107,11 @@ impl<V: Eight<Real = f64>> EquationSums<V> {
     }
 }
 
-/// Steps, those that were refused included.
 const MOST_STEPS: usize = 40;
 
-/// The minimum near `start`, and its equations; every unknown stays between its ends, and one whose ends are the same is not looked for. A
-/// step that lowers the misfit by less than `small` is the last one.
+/// Returns the local minimum near `start` within `ends`, and its normal equations.
+///
+/// Equal ends fix an unknown. The iteration stops when the predicted decrease is at most `small`.
 pub(super) fn descend(
     start: Unknowns,
     ends: [(f64, f64); 3],
@@ -144,8 +140,7 @@ pub(super) fn descend(
     (at, here)
 }
 
-/// The damped step of those unknowns that are free: at an end, the one that leads beyond it is not. `None` where no unknown is free or the
-/// reading tells nothing.
+/// Damped step; an unknown at an end with an outward step is fixed. `None` where the information is singular.
 fn damped_step(equations: &Equations, at: Unknowns, ends: [(f64, f64); 3], damping: f64) -> Option<Unknowns> {
     let free: [bool; 3] = std::array::from_fn(|k| {
         let ((least, most), right) = (ends[k], equations.right[k]);

@@ -1,5 +1,4 @@
-//! Influence functions, and their inversion: learn what each sensor reads as a function of where the contact is, a
-//! smooth curve, and find the contact whose curve values are the most likely cause of a reading.
+//! Influence functions of the channels, and their inversion for the contact of a reading.
 
 mod at_nodes;
 mod beam;
@@ -40,7 +39,6 @@ use palpate_mechanics::limit::CramerRaoBound;
 use palpate_mechanics::surface::Extent;
 use serde::{Deserialize, Serialize};
 
-/// Sizes by which learning over a model costs: nodes of the table, and sensors that are mixed into what the model leaves.
 pub(crate) fn sizes_over_a_model(extent: Extent) -> [usize; 2] {
     let (columns, rows) = prior::mixed_sensors(extent);
     let nodes = match extent {
@@ -50,17 +48,17 @@ pub(crate) fn sizes_over_a_model(extent: Extent) -> [usize; 2] {
     [nodes, columns * rows]
 }
 
-/// Influence functions, inverted: of a surface with a model, or of one that is known by its recording alone.
+/// Locator that inverts influence functions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum InfluenceLocator {
-    /// Of a line with a model.
+    /// A line with a model.
     Beam(Box<BeamLocator>),
-    /// Of a plane with a model.
+    /// A plane with a model.
     Plane(Box<PlaneLocator>),
-    /// Of a surface without one, whose readings are linear in the force.
+    /// A surface without a model, with readings linear in the force.
     ForceLinear(Box<ForceLinearLocator>),
-    /// Of a surface without one, otherwise.
+    /// A surface without a model, with other readings.
     Measured(Box<MeasuredLocator>),
 }
 
@@ -99,8 +97,7 @@ impl Fit for Influence {
 }
 
 impl Influence {
-    /// The lightest touch on a bench with a model, found at its false-alarm rate without knowledge of the force; that of `closed-form`
-    /// and `digit` is the same.
+    /// Returns the smallest detectable force at an unknown force, common to `closed-form` and `digit`.
     pub fn lightest_touch<'a>(&self, limit: &'a CramerRaoBound<'a>) -> LightestTouch<'a> {
         let extent = limit.extent();
         let unknowns = unknowns(extent.dimensions(), None);
@@ -118,10 +115,10 @@ impl Influence {
         )
     }
 
-    /// Offsets of the channels at the rows of `asked` by the drift that the task's recording shows; `None` where it shows none, or rows have no times.
+    /// Returns the offsets of the channels at the rows of `asked` by the drift of the task's recording;
+    /// `None` without a drift or without times.
     ///
-    /// On a surface without a model the presses show a drift where readings follow the force, by the stated structure or by the evidence. Elsewhere the order
-    /// of presses could pass for a drift, and the untouched rows alone show it.
+    /// Touched rows show a drift only where readings follow the force on a surface without a model.
     ///
     /// # Errors
     /// [`InfluenceFitError`] where influence functions cannot be learnt, or the watch stopped it.
@@ -140,8 +137,7 @@ impl Influence {
         Ok(course.or_else(|| untouched_rows::offset_course(task.recording, asked)))
     }
 
-    /// Whether the settings suit a surface without mechanics; "corrected" is then the recording alone, as there is nothing to
-    /// correct.
+    /// Checks the settings; `Corrected` uses the recording alone here.
     fn check_measured(&self) -> Result<(), InfluenceFitError> {
         match self {
             Self { source: InfluenceSource::Mechanics, .. } => Err(InfluenceFitError::NoModel),
@@ -153,8 +149,6 @@ impl Influence {
         }
     }
 
-    /// Fits offsets and influence functions of a surface without a model; `None` where the setting, the recording or a named
-    /// nuisance coordinate says that readings are no multiple of the force.
     fn fit_force_linear(&self, task: FitTask) -> Result<Option<ForceLinearLocator>, InfluenceFitError> {
         if self.structure == Structure::Free
             || self.structure == Structure::Auto && has_nuisance(task.recording)
@@ -170,8 +164,7 @@ impl Influence {
         }
     }
 
-    /// True where the presses of a surface without a model allow several structures of the readings, and none is stated: they have two forces or
-    /// more, the untouched 0 among them, and no nuisance coordinate.
+    /// True where the recording permits several structures and none is stated.
     pub(crate) fn has_structures(&self, setup: &Setup, recording: &Recording) -> bool {
         self.structure == Structure::Auto
             && setup.surface().model().is_none()
@@ -180,7 +173,7 @@ impl Influence {
             && !is_one_weight(setup, recording)
     }
 
-    /// The same with readings in proportion to the force, where no structure is stated and one weight pressed: nothing else tells contacts of other forces.
+    /// Assumes readings proportional to the force for rows of one weight.
     fn of_one_weight(self, FitTask { setup, recording, .. }: FitTask) -> Self {
         match self.structure {
             Structure::Auto if is_one_weight(setup, recording) => {
@@ -193,8 +186,8 @@ impl Influence {
     /// Fits the influence functions of a plane with a model.
     ///
     /// # Errors
-    /// [`InfluenceFitError`] when the surface has no model, several contacts are to be told apart, or the recording says
-    /// too little.
+    /// [`InfluenceFitError`] when the surface has no model, several contacts are asked for, or the recording
+    /// is insufficient.
     pub fn fit_plane(&self, task: FitTask) -> Result<PlaneLocator, InfluenceFitError> {
         plane::fit(*self, task)
     }
@@ -202,14 +195,13 @@ impl Influence {
     /// Fits the influence functions of a line with a model.
     ///
     /// # Errors
-    /// [`InfluenceFitError`] when the surface has no model or the recording says too little.
+    /// [`InfluenceFitError`] when the surface has no model or the recording is insufficient.
     pub fn fit_beam(&self, task: FitTask) -> Result<BeamLocator, InfluenceFitError> {
         beam::fit(*self, task)
     }
 }
 
-/// True of presses for contacts of unknown force whose own forces hardly differ, with untouched rows: they do not show how readings depend on the force, and
-/// held-out presses like them do not show what a structure says of other forces.
+/// True of calibration rows of nearly one force, for an unknown force.
 pub(crate) fn is_one_weight(setup: &Setup, recording: &Recording) -> bool {
     let forces_n = || recording.rows.iter().filter(|row| row.touches()).filter_map(|row| row.force_n);
     let ends = forces_n().reduce(f64::min).zip(forces_n().reduce(f64::max));
@@ -219,13 +211,12 @@ pub(crate) fn is_one_weight(setup: &Setup, recording: &Recording) -> bool {
         && force_linear::has_forces(setup, recording)
 }
 
-/// True of a recording with coordinates beside position and force that shape the readings.
 fn has_nuisance(recording: &Recording) -> bool {
     recording.rows.iter().any(|row| !row.nuisances.is_empty())
 }
 
 impl InfluenceLocator {
-    /// Leaves channel `channel` (from 0) out of all sums from now on; false, and no change, where that cannot be.
+    /// Excludes channel `channel` (from 0); returns false, without a change, where that is impossible.
     pub fn leave_out(&mut self, channel: usize) -> bool {
         match self {
             Self::Beam(beam) => beam.leave_out(channel),
@@ -236,7 +227,7 @@ impl InfluenceLocator {
 }
 
 impl InfluenceLocator {
-    /// The influence functions with their uncertainty; `None` of readings that are learnt as no multiple of the force.
+    /// Returns the influence functions; `None` where readings are not a multiple of the force.
     pub fn influences_at_nodes(&self) -> Option<InfluencesAtNodes> {
         match self {
             Self::Beam(beam) => Some(beam.influences_at_nodes()),
@@ -246,7 +237,7 @@ impl InfluenceLocator {
         }
     }
 
-    /// True of one whose estimates have a force.
+    /// True where estimates have a force.
     pub fn tells_force(&self) -> bool {
         match self {
             Self::Beam(_) | Self::Plane(_) | Self::ForceLinear(_) => true,
@@ -254,7 +245,7 @@ impl InfluenceLocator {
         }
     }
 
-    /// Share of untouched readings that may be taken for a contact; `None` of one that tells no untouched reading.
+    /// Returns the false-alarm rate of untouched readings; `None` without detection.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         match self {
             Self::Beam(beam) => Some(beam.false_alarm_rate()),

@@ -1,29 +1,26 @@
-//! Mean and covariance of a contact that is spread over many places.
+//! Mean and covariance of a weighted distribution of contacts.
 
-/// Weighted sums over contacts (x, y, W), from which mean and covariance follow.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Moments {
     pub weight: f64,
-    /// Of x, y and W.
+    /// x, y and W.
     first: [f64; 3],
-    /// Of their products: xx, xy, xf, yy, yf, ff.
+    /// xx, xy, xf, yy, yf, ff.
     second: [f64; 6],
 }
 
 impl Moments {
-    /// Adds a contact.
     pub fn add(&mut self, weight: f64, contact: [f64; 3]) {
         self.weight += weight;
         self.first.iter_mut().zip(contact).for_each(|(sum, value)| *sum += weight * value);
         self.second.iter_mut().zip(products(contact)).for_each(|(sum, value)| *sum += weight * value);
     }
 
-    /// Adds what the force of a contact with this weight varies at its place.
     pub fn add_force_variance(&mut self, weight: f64, variance_n2: f64) {
         self.second[5] += weight * variance_n2;
     }
 
-    /// The mean of x, y and W, and their covariance xx, xy, xf, yy, yf, ff; NaN where nothing was added.
+    /// Mean of x, y, W and covariance xx, xy, xf, yy, yf, ff; NaN for an empty sum.
     pub fn mean_and_covariance(&self) -> ([f64; 3], [f64; 6]) {
         let mean = self.first.map(|sum| sum / self.weight);
         let squares = products(mean);

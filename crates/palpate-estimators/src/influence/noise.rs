@@ -1,30 +1,25 @@
-//! What the noise of the channels does to a comparison of readings.
+//! Covariance of the channels' noise, and whitening by it.
 
 use ndarray::{Array2, ArrayView1};
 
 use palpate_numerics::{Cholesky, NotPositiveDefinite, symmetric_eigen};
 
-/// A linear map W of readings after which noise is the unit matrix and what the process does not know is diagonal:
-/// W·C·Wᵀ = I, W·S·Wᵀ = diag(d).
+/// Linear map W of readings that whitens the noise C and diagonalizes the signal's covariance S: W·C·Wᵀ = I,
+/// W·S·Wᵀ = diag(d).
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Whitening {
     /// W, m×m, row by row.
     pub matrix: Vec<f64>,
-    /// d: the signal's variance over the noise's in each whitened channel; at least 0.
+    /// d: ratio of signal and noise variance per whitened channel; at least 0.
     pub signal: Vec<f64>,
-    /// γ: the standard deviation of a gain about 1 that all channels of one reading share; 0 where a nuisance coordinate
-    /// or a logarithm has taken its place.
+    /// γ: standard deviation of a common-mode gain error; 0 where a nuisance coordinate or a logarithm
+    /// replaces it.
     pub gain: f64,
 }
 
 impl Whitening {
-    /// From the covariance C of the noise and S of the signal, both m×m, and γ.
-    ///
-    /// C = L·Lᵀ, L⁻¹·S·L⁻ᵀ = U·diag(d)·Uᵀ, W = Uᵀ·L⁻¹.
-    ///
-    /// # Errors
-    /// [`NotPositiveDefinite`] where C is singular.
+    /// Computes W: C = L·Lᵀ, L⁻¹·S·L⁻ᵀ = U·diag(d)·Uᵀ, W = Uᵀ·L⁻¹.
     pub(super) fn from_covariances(noise: Noise, signal: &Array2<f64>) -> Result<Self, NotPositiveDefinite> {
         let m = noise.covariance.nrows();
         let factor = Cholesky::factor(noise.covariance)?;
@@ -35,19 +30,18 @@ impl Whitening {
         Ok(Self { matrix: matrix.iter().copied().collect(), signal, gain: noise.gain })
     }
 
-    /// The same for noise, gain and signal of `factor` times the deviation.
+    /// Multiplies the standard deviations by `factor`.
     pub(super) fn widened(mut self, factor: f64) -> Self {
         self.gain *= factor;
         self.matrix.iter_mut().for_each(|weight| *weight /= factor);
         self
     }
 
-    /// Channels, m.
+    /// Number of channels, m.
     pub fn channels(&self) -> usize {
         self.signal.len()
     }
 
-    /// W·y into `out`.
     pub(super) fn apply(&self, scaled: &[f64], out: &mut [f64]) {
         for (out, row) in out.iter_mut().zip(self.matrix.chunks_exact(self.channels().max(1))) {
             *out = row.iter().zip(scaled).map(|(w, y)| w * y).sum();
@@ -55,7 +49,7 @@ impl Whitening {
     }
 }
 
-/// Scatter of a reading about the mean of its place: e ~ N(0, C) and a factor 1 + N(0, γ²).
+/// Deviation of a reading: e ~ N(0, C) and a factor 1 + N(0, γ²).
 #[derive(Clone, Debug)]
 pub(super) struct Noise {
     /// C.
@@ -64,18 +58,17 @@ pub(super) struct Noise {
     pub gain: f64,
 }
 
-/// Degrees of freedom that tell a variance; of each channel, their covariance.
+/// Least degrees of freedom for a variance, and per channel for a covariance.
 const LEAST_FREEDOM: usize = 4;
-/// Rounds of the iteration that tells gain from noise.
+/// Rounds of expectation–maximization.
 const ROUNDS: usize = 40;
 
 impl Noise {
-    /// From repeats: `places` says of each row where it belongs, `means` are the places' mean outputs. `None` with less than 4 degrees of freedom. With less
-    /// than 4 for each channel the channels' variances are told, but not how they go together.
+    /// Estimates C and γ from repeats; row i is at place `places[i]` with mean output `means`.
     ///
-    /// Each deviation is a·f + e with f the place's mean and a a gain error. C and γ are those of greatest likelihood,
-    /// found by expectation and maximisation (Dempster, Laird and Rubin 1977); without gain, C is the pooled covariance. The
-    /// variances in `floor` are added.
+    /// Each deviation is a·f + e with f the mean and a a gain error. C and γ maximize the likelihood by
+    /// expectation–maximization (Dempster, Laird and Rubin 1977). `floor` is added to the variances. `None`
+    /// with less than 4 degrees of freedom; with less than 4 per channel C is diagonal.
     pub fn of_repeats(
         places: &[usize],
         outputs: &Array2<f64>,
@@ -89,7 +82,7 @@ impl Noise {
         if freedom < LEAST_FREEDOM {
             return Ok(None);
         }
-        // A mean of n rows takes a share of 1/n of their scatter with it.
+        // A mean of n rows absorbs a share of 1/n of their scatter.
         let used: Vec<usize> = (0..places.len()).filter(|row| rows[places[*row]] > 1).collect();
         let deviations = Array2::from_shape_fn((used.len(), channels), |(i, j)| {
             let place = places[used[i]];
@@ -100,7 +93,7 @@ impl Noise {
         let floor = Array2::from_diag(&ArrayView1::from(floor));
         let covariance = deviations.t().dot(&deviations) / count;
         if freedom < LEAST_FREEDOM * channels {
-            // The variance of Student's t, as few repeats told it.
+            // Variance of Student's t with these degrees of freedom.
             let students = freedom as f64 / (freedom as f64 - 2.0);
             let variances = Array2::from_diag(&covariance.diag()) * students;
             return Ok(Some(Self { covariance: variances + floor, gain: 0.0 }));
@@ -117,7 +110,6 @@ impl Noise {
         Ok(Some(noise))
     }
 
-    /// One round: the gain of every row as it probably was, then what is left.
     fn improved(&self, deviations: &Array2<f64>, means: &Array2<f64>) -> Result<Self, NotPositiveDefinite> {
         let precision = Cholesky::factor(self.covariance.clone())?.inverse();
         let weighted = means.dot(&precision);
@@ -139,7 +131,6 @@ impl Noise {
     }
 }
 
-/// Rows at each of `count` places.
 fn repeats(places: &[usize], count: usize) -> Vec<usize> {
     let mut rows = vec![0; count];
     places.iter().for_each(|place| rows[*place] += 1);

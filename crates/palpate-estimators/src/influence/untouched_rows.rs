@@ -1,26 +1,22 @@
-//! Offsets of a surface with a model by the untouched rows of its recording.
+//! Offsets of a surface with a model by the untouched rows: their mean, or with a drift the interpolation in
+//! time between rests.
 //!
-//! Where the untouched rows show no drift, their mean is the offset of every row. Where they drift, the offset of a row is interpolated in time between the
-//! means of the rests before and after it. With the weights a and b of two rests of n and m rows, a reading less that offset has the variance
-//! σ²·(1 + a²/n + b²/m) of noise of variance σ².
+//! With the weights a and b of two rests of n and m rows, a reading minus that offset has the variance
+//! σ²·(1 + a²/n + b²/m).
 
 use crate::offset_course::OffsetCourse;
 use crate::recording::{Recording, Row};
 use crate::untouched_drift::UntouchedDrift;
 use palpate_numerics::mean;
 
-/// Untouched rows of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct UntouchedRows {
-    /// Mean reading of each channel.
     pub mean: Vec<f64>,
-    /// Number of rows.
     pub count: f64,
-    /// Sum of squared deviations of each channel from the mean of its rest, or of all rows where these do not drift.
+    /// Squared deviations about the mean of the rest, or of all rows without a drift.
     pub scatter: Vec<f64>,
-    /// Degrees of freedom of the scatter.
     pub freedom: f64,
-    /// Time and mean of each rest, with its number of rows, where the rows drift; empty where they do not.
+    /// Empty without a drift.
     rests: Vec<Rest>,
 }
 
@@ -31,7 +27,7 @@ struct Rest {
     count: f64,
 }
 
-/// Offset of a row: of each channel, with its variance over that of the noise.
+/// Offset of a row, with its variance relative to that of the noise.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct RowOffset {
     pub values: Vec<f64>,
@@ -39,7 +35,6 @@ pub(super) struct RowOffset {
 }
 
 impl UntouchedRows {
-    /// Those of a recording; `None` where nothing but presses was recorded.
     pub fn of_recording(recording: &Recording) -> Option<Self> {
         let mean = recording.untouched_mean()?;
         let rests = recording.rests();
@@ -68,12 +63,10 @@ impl UntouchedRows {
         })
     }
 
-    /// True where the offsets of rows differ.
     pub fn drifts(&self) -> bool {
         !self.rests.is_empty()
     }
 
-    /// The offset of a row, by its time in the recording.
     pub fn offset_at(&self, time: f64) -> RowOffset {
         let after = self.rests.partition_point(|rest| rest.time <= time);
         let of_rest =
@@ -93,9 +86,9 @@ impl UntouchedRows {
         }
     }
 
-    /// The rows of a recording in which something touched, less their offsets, each with the variance of its reading over that of the noise.
+    /// Returns the touched rows minus their offsets, each with the relative variance of the reading.
     ///
-    /// One mean of all untouched rows errs alike in all rows, and is left to the learning: its variance is not counted in the rows.
+    /// Without a drift, the learning accounts for the common error of the mean.
     pub fn tared_presses(&self, recording: &Recording) -> Vec<(Row, f64)> {
         let times = recording.times_or_order();
         let rows = recording.rows.iter().zip(times).filter(|(row, _)| row.touches());
@@ -109,7 +102,7 @@ impl UntouchedRows {
     }
 }
 
-/// Offsets at the rows of `asked` by the untouched rows of a recording; `None` where these show no drift, or rows have no times.
+/// Offsets at the rows of `asked`; `None` without a drift or without times.
 pub(super) fn offset_course(recording: &Recording, asked: &Recording) -> Option<OffsetCourse> {
     let untouched = UntouchedRows::of_recording(recording).filter(UntouchedRows::drifts)?;
     recording.times_s()?;

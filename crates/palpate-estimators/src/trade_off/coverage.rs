@@ -1,4 +1,4 @@
-//! Coverage of contacts by their distance from the end of the paper's beam: a sample of the experiment `beam-ends`.
+//! Coverage by distance from the end of the paper's beam: a sample of the experiment `beam-ends`.
 
 use crate::arrangement::Training;
 use crate::closed_form::ClosedForm;
@@ -14,17 +14,15 @@ use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::ops::RangeInclusive;
 
-/// Distances from the left end, in millimetres.
 const PLACES_MM: [f64; 5] = [1.0, 4.0, 15.0, 40.0, 100.0];
 
-/// Readings at each place, and calibrations that locate them in turn.
+/// Readings per place, with the locators of all calibrations in turn.
 const READINGS: usize = 300;
 const CALIBRATIONS: u64 = 20;
 
-/// Four standard deviations of 300 readings (5 %), and 1.5 % by which the experiment's coverage differs from 95 %.
+/// Four standard deviations of 300 readings (5 %), and 1.5 % between the experiment's coverage and 95 %.
 const COVERED_PERCENT: RangeInclusive<f64> = 88.5..=100.0;
 
-/// The paper's beam, pressed with its known force.
 fn bench(force_is_known: bool) -> Example {
     let mut bench = paper(5e-6, 10);
     if !force_is_known {
@@ -34,7 +32,6 @@ fn bench(force_is_known: bool) -> Example {
     bench
 }
 
-/// Coverage of contacts at one place, by locators in turn.
 fn covered(
     bench: &Example,
     locators: &[Box<dyn Locate<Check = NoCheck>>],
@@ -151,7 +148,7 @@ fn the_closed_form_covers_a_known_force_at_every_distance_from_the_end() {
     check("closed form, force known", &bench, &closed_form(&bench), &[3.0]);
 }
 
-/// Without the logarithm of the determinant, 20 presses cover 68 to 88 % up to 40 mm from the end.
+/// Without the log determinant, the coverage is 68 to 88 % up to 40 mm from the end.
 #[test]
 fn influence_learnt_from_presses_alone_covers_unknown_forces_at_every_distance_from_the_end() {
     let mut bench = bench(false);

@@ -60,10 +60,9 @@ pub enum Scale {
 /// Largest drawn magnitude; a larger range could overflow.
 const LARGEST: f64 = 1e300;
 const SMALLEST: f64 = 1e-300;
-/// Free share of the range at each end of an automatic axis.
 const PADDING: f64 = 0.04;
 
-/// Range of an axis: `low` < `high`, both positive on a logarithmic axis.
+/// Range with `low` < `high`, both positive on a logarithmic axis.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct AxisScale {
     pub low: f64,
@@ -77,13 +76,12 @@ impl AxisScale {
         AxisScale { low, high, scale: axis.scale }
     }
 
-    /// Position of a data value: 0 at the low end, 1 at the high end, limited to ±1e6. `None` for a
-    /// value that the scale cannot show.
+    /// 0 at the low end, 1 at the high end, limited to ±1e6; `None` for an undrawable value.
     pub fn share(&self, value: f64) -> Option<f64> {
         drawable(self.scale, value).then(|| self.tick_share(value))
     }
 
-    /// [`AxisScale::share`] of a value on the axis; rounded ends may exceed the bounds of data.
+    /// Position of a tick; rounded ends may exceed the bounds of data.
     pub fn tick_share(&self, value: f64) -> f64 {
         let share = match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
@@ -92,7 +90,7 @@ impl AxisScale {
         share.clamp(-1e6, 1e6)
     }
 
-    /// [`AxisScale::share`], but non-positive values lie on the low end of a logarithmic axis.
+    /// [`Self::share`], but non-positive values lie on the low end of a logarithmic axis.
     pub fn share_or_low_end(&self, value: f64) -> Option<f64> {
         match self.scale {
             Scale::Log10 if value <= 0.0 && value.is_finite() => Some(0.0),
@@ -151,7 +149,7 @@ fn log_ends(low: f64, high: f64) -> (f64, f64) {
     ((low / factor).max(SMALLEST), (high * factor).min(LARGEST))
 }
 
-/// Smallest of 1, 2 or 5 times a power of ten that is at least `least` > 0.
+/// Smallest of 1, 2 or 5 times a power of ten ≥ `least` > 0.
 fn round_step_above(least: f64) -> f64 {
     let decade = 10_f64.powi(least.log10().floor() as i32);
     [1.0, 2.0, 5.0]
@@ -161,15 +159,12 @@ fn round_step_above(least: f64) -> f64 {
         .unwrap_or(10.0 * decade)
 }
 
-/// Greatest number of ticks.
 const MOST: usize = 11;
-/// Multiples of a power of ten, from fine to coarse, for few decades.
+/// From fine to coarse, for few decades.
 const LOG_MULTIPLES: [&[f64]; 3] = [&[1.0, 2.0, 5.0], &[1.0, 3.0], &[1.0]];
 
 pub(crate) const TICK_SIZE: f64 = 11.5;
-/// Distance from the plot to the labels of the vertical axis.
 pub(crate) const TICK_GAP: f64 = 8.0;
-/// Distance from the plot to the middle of the labels of the horizontal axis.
 const TICK_DROP: f64 = 16.0;
 /// Least distances between neighbouring labels, and between their middles.
 pub(crate) const LABEL_GAP: f64 = 14.0;
@@ -182,8 +177,8 @@ pub(crate) struct Tick {
     pub label: String,
 }
 
-/// Returns the ticks `asked` that fit, or the finest round ones that `fits` accepts. `fits` must
-/// accept a single tick.
+/// Returns the ticks `asked` that fit, or the finest round ones that fit. `fits` must accept a
+/// single tick.
 pub(crate) fn choose_ticks(
     axis: &AxisScale,
     asked: Option<&[(f64, String)]>,
@@ -196,7 +191,7 @@ pub(crate) fn choose_ticks(
     }
 }
 
-/// Unlabelled grid lines between successive decades of a logarithmic axis.
+/// Grid lines between successive decades of a logarithmic axis.
 pub(crate) fn minor_ticks(axis: &AxisScale, ticks: &[Tick]) -> Vec<f64> {
     let decades =
         ticks.len() > 1 && ticks.windows(2).all(|pair| (pair[1].value / pair[0].value - 10.0).abs() < 1e-6);
@@ -206,7 +201,6 @@ pub(crate) fn minor_ticks(axis: &AxisScale, ticks: &[Tick]) -> Vec<f64> {
     multiples_of_decades(axis, &[2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0], 1)
 }
 
-/// Returns the ticks `asked` that are on the axis and fit.
 fn chosen(axis: &AxisScale, asked: &[(f64, String)], fits: &dyn Fn(&[Tick]) -> bool) -> Vec<Tick> {
     let on_axis = asked.iter().filter(|(value, _)| is_on_axis(axis, *value));
     let mut asked: Vec<Tick> =
@@ -297,7 +291,6 @@ fn log_label(value: f64) -> String {
     }
 }
 
-/// Formats a number with at most six digits.
 pub(crate) fn plain(value: f64) -> String {
     match exponent(value) {
         _ if value == 0.0 => "0".to_owned(),
@@ -310,7 +303,7 @@ pub(crate) fn plain(value: f64) -> String {
     }
 }
 
-/// Power of ten of the first digit; rounded up for a value that prints as the next power.
+/// Exponent of the first digit; rounded up for a value that prints as the next power.
 fn exponent(value: f64) -> i32 {
     (value.abs().log10() + 1e-9).floor() as i32
 }
@@ -323,7 +316,6 @@ fn scientific(value: f64, decimals: usize) -> String {
     format!("{mantissa}e{power}").replace('-', "−")
 }
 
-/// Adds thousands separators and a true minus sign.
 fn grouped(number: &str) -> String {
     let (sign, magnitude) = number.strip_prefix('-').map_or(("", number), |rest| ("−", rest));
     let whole = magnitude.find('.').unwrap_or(magnitude.len());
@@ -360,12 +352,10 @@ pub(crate) fn tick_labels(
     columns.chain(rows).collect()
 }
 
-/// Returns true if labels above each other are far enough apart.
 pub(crate) fn rows_fit(axis: &AxisScale, ticks: &[Tick], height: f64) -> bool {
     pairs(axis, ticks).all(|(pitch, _, _)| pitch * height >= LEAST_Y_PITCH)
 }
 
-/// Returns true if labels beside each other are far enough apart.
 pub(crate) fn columns_fit(axis: &AxisScale, ticks: &[Tick], width: f64) -> bool {
     pairs(axis, ticks).all(|(pitch, before, after)| {
         let labels = text::width(&before.label, TICK_SIZE) / 2.0 + text::width(&after.label, TICK_SIZE) / 2.0;

@@ -229,7 +229,6 @@ impl Extremes {
         finite.fold(None, wider).unwrap_or_default()
     }
 
-    /// Extremes of all lines.
     pub fn from_lines(series: &[Series]) -> Self {
         Self::from_values(series.iter().flat_map(|series| match &series.kind {
             SeriesKind::Line { points, .. } => points.iter().map(|point| point.1).collect(),
@@ -237,12 +236,10 @@ impl Extremes {
         }))
     }
 
-    /// Returns true if only a logarithmic axis shows both ends.
     pub fn are_far_apart(self) -> bool {
         self.least > 0.0 && self.greatest >= LOGARITHMIC_FROM * self.least
     }
 
-    /// Axis with both ends: logarithmic if they are far apart.
     pub fn axis(self, label: &str) -> Axis {
         if self.are_far_apart() { Axis::log10(label) } else { Axis::linear(label) }
     }

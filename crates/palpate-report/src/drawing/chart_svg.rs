@@ -11,7 +11,7 @@ const REFERENCE_WIDTH: f64 = 1.2;
 const ERROR_BAR_WIDTH: f64 = 1.5;
 const CAP_HALF_WIDTH: f64 = 4.0;
 const MARKER_RADIUS: f64 = 4.2;
-/// White rim that separates a marker from the shapes under it.
+/// Separates a marker from the shapes under it.
 const MARKER_RIM: f64 = 1.2;
 const CROSS_WIDTH: f64 = 2.0;
 const BAND_OPACITY: f64 = 0.2;
@@ -19,8 +19,7 @@ const SPAN_OPACITY: f64 = 0.05;
 
 /// Draws a chart as a self-contained SVG document of `width_px` × `height_px`.
 ///
-/// A legend without room for all names ends with the number of missing ones. Texts have the
-/// reader's sans-serif font.
+/// A legend without room for all names ends with the number of missing ones.
 pub fn chart_to_svg(chart: &Chart) -> String {
     let layout = Layout::new(chart);
     let mut painter = Painter { svg: Svg::new(layout.width_px, layout.height_px), layout: &layout };
@@ -226,7 +225,6 @@ fn runs<T>(items: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
     runs
 }
 
-/// Draws a white ground, slightly larger than the marker.
 fn draw_rim(svg: &mut Svg, at: Point, marker: Marker) {
     draw_shape(svg, at, marker, MARKER_RADIUS + MARKER_RIM, CROSS_WIDTH + MARKER_RIM, WHITE);
 }
@@ -235,7 +233,6 @@ fn draw_marker(svg: &mut Svg, at: Point, marker: Marker, colour: Colour) {
     draw_shape(svg, at, marker, MARKER_RADIUS, CROSS_WIDTH, colour);
 }
 
-/// Draws a marker; all shapes look equally large at one `radius`.
 fn draw_shape(svg: &mut Svg, at: Point, marker: Marker, radius: f64, cross_width: f64, colour: Colour) {
     match marker {
         Marker::Circle => svg.disc(at, radius, colour),
@@ -252,7 +249,7 @@ fn square((x, y): Point, half: f64) -> Rect {
     Rect { left: x - half, right: x + half, top: y - half, bottom: y + half }
 }
 
-/// Equilateral triangle, apex up, with corners at `radius` from the centre.
+/// Apex up, with corners at `radius` from the centre.
 fn triangle((x, y): Point, radius: f64) -> [Point; 3] {
     let half_side = radius * 0.75_f64.sqrt();
     [(x, y - radius), (x + half_side, y + radius / 2.0), (x - half_side, y + radius / 2.0)]

@@ -3,7 +3,7 @@
 /// A point in pixels, y downward.
 pub(crate) type Point = (f64, f64);
 
-/// An upright rectangle in pixels, y downward.
+/// An upright rectangle, y downward.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Rect {
     pub left: f64,
@@ -30,7 +30,6 @@ impl Rect {
         }
     }
 
-    /// Returns true for a point inside or on the edge.
     pub fn contains(&self, (x, y): Point) -> bool {
         (self.left..=self.right).contains(&x) && (self.top..=self.bottom).contains(&y)
     }
@@ -48,7 +47,6 @@ impl Rect {
         ]
     }
 
-    /// Pieces of a polyline inside.
     pub fn clip_line(&self, points: &[Point]) -> Vec<Vec<Point>> {
         let mut pieces: Vec<Vec<Point>> = Vec::new();
         for ends in points.windows(2) {
@@ -61,7 +59,7 @@ impl Rect {
         pieces
     }
 
-    /// Part of a segment inside (Liang and Barsky).
+    /// Liang and Barsky's algorithm.
     fn clip_segment(&self, start: Point, end: Point) -> Option<(Point, Point)> {
         let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
         for inside in self.insides() {
@@ -78,7 +76,7 @@ impl Rect {
         (enter <= leave).then_some((first, last))
     }
 
-    /// Part of a polygon inside (Sutherland and Hodgman); may be empty.
+    /// Sutherland and Hodgman's algorithm; the result may be empty.
     pub fn clip_polygon(&self, points: &[Point]) -> Vec<Point> {
         let mut clipped = points.to_vec();
         for inside in self.insides() {

@@ -12,20 +12,15 @@ const TITLE_SIZE: f64 = 15.0;
 const TITLE_LINE: f64 = 26.0;
 const NAME_SIZE: f64 = 12.5;
 const NAME_LINE: f64 = 28.0;
-/// Distance from the top of a map or colour bar to the middle of its name, above the labels beside
-/// it.
 const NAME_RISE: f64 = 17.0;
-/// Room for tick labels, left of a map and beneath it.
 const GUTTER: f64 = 40.0;
 const FOOT: f64 = 26.0;
 const GAP: f64 = 18.0;
 const BAR_WIDTH: f64 = 16.0;
 const BAR_LABELS: f64 = 54.0;
-/// Least width of one map beside another.
 const LEAST_WIDTH: f64 = 120.0;
-/// Greatest height of one map.
 const MOST_HEIGHT: f64 = 420.0;
-/// Overlap of neighbouring cells, which hides the background between them.
+/// Hides the background between neighbouring cells.
 const OVERLAP: f64 = 0.5;
 
 /// A quantity over a plane.
@@ -105,7 +100,6 @@ fn sides_mm(map: &HeatMap) -> [f64; 2] {
     [extent.length_m() * 1e3, extent.width_m().unwrap_or(extent.length_m()) * 1e3]
 }
 
-/// Lines of a title at the top of an image.
 fn title_labels(title: &str, width: f64) -> Vec<Label> {
     const MOST_LINES: usize = 2;
     let lines = text::wrap(title, TITLE_SIZE, width - 2.0 * MARGIN, MOST_LINES).into_iter().enumerate();
@@ -246,7 +240,6 @@ fn draw_cells(svg: &mut Svg, map: &HeatMap, panel: &HeatPanel, plot: Rect, colou
     }
 }
 
-/// Draws white rings with a dark middle, visible on any colour.
 fn draw_dots(svg: &mut Svg, map: &HeatMap, plot: Rect) {
     let (rim, middle) = if plot.width() < 200.0 { (3.2, 1.9) } else { (4.8, 3.0) };
     let [length_mm, width_mm] = sides_mm(map);
@@ -258,7 +251,7 @@ fn draw_dots(svg: &mut Svg, map: &HeatMap, plot: Rect) {
 }
 
 /// Viridis at ten even steps (van der Walt and Smith, 2015; public domain). Lightness rises with
-/// the value, so the colours are distinguishable for all readers and in grey print.
+/// the value, also in grey print.
 const VIRIDIS: [Colour; 10] = [
     Colour::opaque(68, 1, 84),
     Colour::opaque(72, 40, 120),
@@ -272,7 +265,6 @@ const VIRIDIS: [Colour; 10] = [
     Colour::opaque(253, 231, 37),
 ];
 
-/// Colour for a share of the scale, clamped to 0 to 1.
 fn colour_of(share: f64) -> Colour {
     let place = share.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f64;
     let below = (place as usize).min(VIRIDIS.len() - 2);

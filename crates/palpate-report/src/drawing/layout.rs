@@ -19,15 +19,12 @@ const AXIS_LABEL_LINE: f64 = 20.0;
 const TICK_LINE: f64 = 24.0;
 const MARK_SIZE: f64 = 11.5;
 const MARK_LINE: f64 = 17.0;
-/// Distance from the header to the plot or names of marks, and from the axis label to the legend.
 const STRIP_GAP: f64 = 8.0;
-/// Greatest number of rows of names above the plot.
 const MARK_ROWS: usize = 3;
-/// Share of the height that the legend leaves to the plot.
 const LEAST_PLOT_SHARE: f64 = 0.25;
-/// Least room left of the plot: half of the widest tick label.
+/// Half of the widest tick label.
 const LEAST_GUTTER: f64 = 44.0;
-/// Half of the widest tick label, at the right end of the axis.
+/// Half of the widest tick label.
 const OVERHANG: f64 = 36.0;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -82,7 +79,7 @@ impl<'a> Layout<'a> {
         Layout { width_px, height_px, plot, x, y, x_ticks, y_ticks, labels, legend }
     }
 
-    /// Maps data to pixels; `None` for a point that an axis cannot show.
+    /// Maps data to pixels; `None` for an undrawable point.
     pub fn place(&self, x: f64, y: f64) -> Option<Point> {
         Some((self.x_px(self.x.share(x)?), self.y_px(self.y.share(y)?)))
     }
@@ -92,7 +89,7 @@ impl<'a> Layout<'a> {
         self.place(x, y).filter(|&at| self.plot.contains(at))
     }
 
-    /// [`Layout::place`], but a non-positive y lies on the low end of a logarithmic axis.
+    /// [`Self::place`], but a non-positive y lies on the low end of a logarithmic axis.
     pub fn place_edge(&self, x: f64, y: f64) -> Option<Point> {
         Some((self.x_px(self.x.share(x)?), self.y_px(self.y.share_or_low_end(y)?)))
     }
@@ -110,7 +107,7 @@ fn line_if(text: &str, line: f64) -> f64 {
     if text.trim().is_empty() { 0.0 } else { line }
 }
 
-/// Title and vertical axis label, and the top of the room beneath them.
+/// Also returns the top of the room beneath the header.
 fn header(chart: &Chart, width: f64) -> (Vec<Label>, f64) {
     let room = width - 2.0 * MARGIN;
     let at_left = |text: String, top: f64, line: f64, size: f64, colour| Label {
@@ -132,7 +129,6 @@ fn header(chart: &Chart, width: f64) -> (Vec<Label>, f64) {
     (labels, top + STRIP_GAP)
 }
 
-/// Horizontal axis label, under the middle of the plot as far as the image allows.
 fn x_axis_label(chart: &Chart, plot: &Rect, width: f64) -> Option<Label> {
     let text = text::wrap(&chart.x.label, AXIS_LABEL_SIZE, width - 2.0 * MARGIN, 1).pop()?;
     let half = text::width(&text, AXIS_LABEL_SIZE) / 2.0;
@@ -158,8 +154,7 @@ fn vertical_names(chart: &Chart) -> impl Iterator<Item = ((f64, f64), &str)> {
         .filter(|(_, label)| !label.trim().is_empty())
 }
 
-/// Names of the vertical marks between `left` and `right`, lowest row first; also returns the
-/// number of rows.
+/// Lowest row first; also returns the number of rows.
 fn mark_labels(chart: &Chart, x: &AxisScale, (left, right): (f64, f64), top: f64) -> (usize, Vec<Label>) {
     let mut rows = text::Rows::default();
     let mut placed = Vec::new();
@@ -193,7 +188,6 @@ fn widest(ticks: &[Tick]) -> f64 {
     ticks.iter().map(|tick| text::width(&tick.label, TICK_SIZE)).fold(0.0, f64::max)
 }
 
-/// Length by which the last tick's label exceeds the axis.
 fn overhang(axis: &AxisScale, ticks: &[Tick], width: f64) -> f64 {
     let reach = ticks.last().map_or(0.0, |tick| {
         let half = text::width(&tick.label, TICK_SIZE) / 2.0;
@@ -235,7 +229,6 @@ fn values(chart: &Chart) -> (Vec<f64>, Vec<f64>) {
 const ROW_HEIGHT: f64 = 20.0;
 const NAME_SIZE: f64 = 12.0;
 const SWATCH_WIDTH: f64 = 24.0;
-/// Distance from the left of a swatch to the left of its name.
 const INDENT: f64 = 31.0;
 const GAP: f64 = 18.0;
 
@@ -254,7 +247,6 @@ pub(crate) struct Entry<'a> {
     pub area: Rect,
 }
 
-/// Legend of a chart, at the origin until it is moved.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Legend<'a> {
     pub entries: Vec<Entry<'a>>,
@@ -265,7 +257,6 @@ pub(crate) struct Legend<'a> {
 }
 
 impl<'a> Legend<'a> {
-    /// Arranges entries in at most `most_rows` rows of `width`.
     pub fn new(chart: &'a Chart, width: f64, most_rows: usize) -> Self {
         let names: Vec<(Named<'_>, String)> =
             names(chart).map(|(named, name)| (named, text::fit(name, NAME_SIZE, width - INDENT))).collect();
@@ -308,7 +299,6 @@ struct Place {
     width: f64,
 }
 
-/// Arranges the first `kept` names, with a remark if they are not all.
 fn arrange(names: &[(Named<'_>, String)], kept: usize, width: f64) -> Vec<Place> {
     let mut widths: Vec<f64> =
         names[..kept].iter().map(|(_, name)| INDENT + text::width(name, NAME_SIZE)).collect();

@@ -3,7 +3,7 @@
 use super::geometry::{Point, Rect};
 use std::fmt::{self, Write};
 
-/// Distance from the middle of the capitals to the baseline, in units of the font size.
+/// From the middle of the capitals to the baseline, in units of the font size.
 const CAPITALS_HALF_HEIGHT: f64 = 0.36;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,7 +31,7 @@ const PALETTE: [Colour; 7] = [
     BLACK,
 ];
 
-/// Replacement of each drawing colour on a dark page. Colours of a map's values stay.
+/// Replacements on a dark page; colours of a map's values stay.
 pub(crate) const IN_THE_DARK: [(Colour, Colour); 13] = [
     (INK, Colour::opaque(227, 230, 232)),
     (QUIET_INK, Colour::opaque(176, 182, 187)),
@@ -48,7 +48,6 @@ pub(crate) const IN_THE_DARK: [(Colour, Colour); 13] = [
     (PALETTE[5], Colour::opaque(255, 200, 87)),
 ];
 
-/// Colour with this index, cyclic.
 pub(crate) fn palette(index: usize) -> Colour {
     PALETTE[index % PALETTE.len()]
 }
@@ -63,7 +62,6 @@ impl Colour {
     }
 }
 
-/// Formats "#0072b2"; opacity is a separate attribute.
 impl fmt::Display for Colour {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [red, green, blue] = self.rgb;
@@ -97,13 +95,13 @@ pub(crate) struct Label {
     pub colour: Colour,
 }
 
-/// SVG document with a size in pixels; parts beyond the edge are invisible.
+/// Parts beyond the edge of the document are invisible.
 pub(crate) struct Svg {
     text: String,
 }
 
 impl Svg {
-    /// A white image. Texts have the reader's sans-serif font.
+    /// A white image with the reader's sans-serif font.
     pub fn new(width_px: u32, height_px: u32) -> Self {
         let text = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width_px}\" height=\"{height_px}\" viewBox=\"0 0 {width_px} \
@@ -120,12 +118,10 @@ impl Svg {
         self.text
     }
 
-    /// Draws a line through at least two points.
     pub fn line(&mut self, points: &[Point], width: f64, colour: Colour) {
         self.polyline(points, width, colour, "");
     }
 
-    /// Draws a dashed line.
     pub fn dashed_line(&mut self, points: &[Point], width: f64, colour: Colour) {
         self.polyline(points, width, colour, " stroke-dasharray=\"6 5\"");
     }
@@ -139,7 +135,6 @@ impl Svg {
         }
     }
 
-    /// Draws a filled polygon of at least three corners.
     pub fn polygon(&mut self, corners: &[Point], colour: Colour) {
         if corners.len() > 2 {
             let (corners, fill) = (point_list(corners), Fill(colour));
@@ -161,7 +156,7 @@ impl Svg {
         self.element(format_args!("<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\" {fill}/>"));
     }
 
-    /// Draws a text; characters that are not allowed in XML become spaces.
+    /// Characters that are not allowed in XML become spaces.
     pub fn text(&mut self, label: &Label) {
         let Label { text, at, anchor, size, colour } = label;
         let [x, y, size] = [at.0, at.1 + CAPITALS_HALF_HEIGHT * size, *size].map(decimal);
@@ -181,7 +176,7 @@ impl Svg {
     }
 }
 
-/// Formats two decimals: a hundredth of a pixel is finer than any screen.
+/// Two decimals: a hundredth of a pixel is finer than any screen.
 fn decimal(value: f64) -> String {
     let text = format!("{value:.2}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
@@ -212,7 +207,7 @@ fn escaped(text: &str) -> String {
 mod tests {
     use super::*;
 
-    /// Contrast of two colours (WCAG 2.2, section 1.4.3).
+    /// WCAG 2.2, section 1.4.3.
     fn contrast(a: Colour, b: Colour) -> f64 {
         let linear = |value: u8| {
             let value = f64::from(value) / 255.0;

@@ -3,12 +3,12 @@
 //! The widths follow the wider common sans-serif fonts (DejaVu Sans, Verdana), so a layout is also
 //! valid for the narrower ones (Arial, Noto Sans).
 
-/// Upper estimate of the width of `text` in pixels at a font size of `size` pixels.
+/// Upper estimate of the width of `text` in pixels.
 pub(crate) fn width(text: &str, size: f64) -> f64 {
     text.chars().map(em).sum::<f64>() * size
 }
 
-/// Advance of one character in units of the font size.
+/// Advance in units of the font size.
 fn em(character: char) -> f64 {
     match character {
         'i' | 'j' | 'l' | '\'' | '.' | ',' | ':' | ';' | '|' | ' ' => 0.34,
@@ -22,7 +22,6 @@ fn em(character: char) -> f64 {
     }
 }
 
-/// Cuts `text` to `room` pixels, with an ellipsis.
 pub(crate) fn fit(text: &str, size: f64, room: f64) -> String {
     if width(text, size) <= room {
         return text.to_owned();
@@ -38,8 +37,7 @@ pub(crate) fn fit(text: &str, size: f64, room: f64) -> String {
     format!("{}…", kept.trim_end())
 }
 
-/// Breaks `text` at spaces into at most `lines` lines of `room` pixels, with an ellipsis; no line
-/// for an empty text.
+/// Breaks `text` at spaces into at most `lines` lines of `room` pixels, with an ellipsis.
 pub(crate) fn wrap(text: &str, size: f64, room: f64, lines: usize) -> Vec<String> {
     let mut wrapped: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
@@ -60,7 +58,6 @@ pub(crate) fn wrap(text: &str, size: f64, room: f64, lines: usize) -> Vec<String
 pub(crate) struct Rows(Vec<Vec<(f64, f64)>>);
 
 impl Rows {
-    /// Returns the first row that is free between `left` and `right`, or a new one.
     pub fn first_free(&self, left: f64, right: f64) -> usize {
         let free = |row: &Vec<(f64, f64)>| row.iter().all(|&(start, end)| right <= start || end <= left);
         self.0.iter().position(free).unwrap_or(self.0.len())

@@ -14,7 +14,6 @@ use palpate_studies::paper::COUNTS;
 /// A rule of training, at each number of training positions.
 #[derive(Clone, Copy)]
 struct Family {
-    /// Beginning of the arms' names.
     name: &'static str,
     label: &'static str,
     colour: usize,
@@ -31,18 +30,14 @@ const MIDDLE_6: Family =
 const MIDDLE_4: Family =
     Family { name: "middle4", label: "4 in the middle", colour: 3, marker: Marker::Triangle };
 
-/// A figure of an arm by number of training positions.
 struct Measure {
     title: &'static str,
     axis: Axis,
     of: fn(&ArmResults) -> Option<Quantiles>,
-    /// Key of the published figures.
     key: &'static str,
 }
 
-/// Distance between families, so that their bars do not meet.
 const PITCH: f64 = 1.3;
-/// Distance of a published point from its family.
 const BESIDE: f64 = 0.5;
 
 impl Paper<'_> {
@@ -145,7 +140,7 @@ impl Paper<'_> {
         error_chart(self.report, title, &lines)
     }
 
-    /// Chart of each family's medians with bars, and the paper's points; `None` without an arm.
+    /// Medians with bars, and the paper's points; `None` without an arm.
     fn against_count(&self, measure: &Measure, families: &[Family]) -> Option<Chart> {
         let middle = (families.len() - 1) as f64 / 2.0;
         let families: Vec<(Family, f64)> =
@@ -162,7 +157,6 @@ impl Paper<'_> {
         (!series.is_empty()).then(|| Chart::new(measure.title, x, measure.axis.clone(), series))
     }
 
-    /// Thin line through a family's medians and bars.
     fn found(&self, measure: &Measure, family: Family, shift: f64) -> Vec<Series> {
         let points: Vec<ErrorPoint> = COUNTS
             .iter()

@@ -140,13 +140,12 @@ impl Paper<'_> {
         }
     }
 
-    /// Published figure of an arm with this key.
     fn published(&self, arm: &str, key: &str) -> Option<&PublishedFigure> {
         let id = format!("{arm}.{key}");
         self.published.iter().find(|figure| figure.id == id)
     }
 
-    /// Rig, beam and force in newtons, which all arms share; `None` for another surface.
+    /// All arms share them; `None` for another surface.
     fn setup(&self) -> Option<(&Rig, Beam, f64)> {
         let rig = &self.report.study.study.arms.first()?.rig;
         let SurfaceSpec::Beam(beam) = rig.setup.surface() else { return None };

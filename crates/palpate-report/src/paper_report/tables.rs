@@ -1,5 +1,4 @@
-//! Tables of the paper's report: tables 1 to 3, published against replicated figures, claims, and
-//! settings that the paper does not state.
+//! Tables of the paper's report: tables 1 to 3, replicated figures, claims, and unstated settings.
 
 use maud::{Markup, html};
 
@@ -16,7 +15,6 @@ use palpate_rig::Rig;
 use palpate_studies::PortionResults;
 use palpate_studies::paper::{Claim, ClaimPart, PublishedFigure, Yardstick};
 
-/// Arms with equal training positions.
 struct Set<'a> {
     arms: Vec<&'a str>,
     training: &'a Training,
@@ -24,7 +22,7 @@ struct Set<'a> {
 }
 
 impl Paper<'_> {
-    /// Distinct sets of training positions that `keep` accepts.
+    /// Distinct sets that `keep` accepts.
     fn sets(&self, keep: impl Fn(&Arrangement) -> bool) -> Vec<Set<'_>> {
         let mut sets: Vec<Set> = Vec::new();
         for arm in &self.report.study.study.arms {
@@ -120,7 +118,7 @@ fn even_pitch(positions: &[Position]) -> String {
     }
 }
 
-/// Name in the paper, E1.1 to E3.2: tens of positions, then 1 for six in the middle and 2 for four.
+/// E1.1 to E3.2: tens of positions, then 1 for six in the middle and 2 for four.
 fn paper_name(count: usize, middle: usize) -> String {
     match (count, middle) {
         (10 | 20 | 30, 6) => format!("E{}.1", count / 10),
@@ -129,11 +127,9 @@ fn paper_name(count: usize, middle: usize) -> String {
     }
 }
 
-/// A set with a middle portion and two edges.
 struct EdgeDense<'a> {
     set: &'a Set<'a>,
     middle: usize,
-    /// Number of positions in each edge.
     edge: usize,
     portion: (f64, f64),
 }
@@ -144,7 +140,6 @@ impl<'a> EdgeDense<'a> {
         Some(Self { set, middle, edge: (set.positions.len() - middle) / 2, portion })
     }
 
-    /// Positions of left edge, middle and right edge.
     fn parts(&self) -> [&'a [Position]; 3] {
         let (edge, middle) = (self.edge, self.middle);
         let positions = &self.set.positions;
@@ -166,7 +161,7 @@ fn middle_in_words(sets: &[Set], length_m: f64) -> String {
     if let [only] = portions.as_slice() { format!(" ({only})") } else { String::new() }
 }
 
-/// Equally spaced positions in short: "33.33, 66.67", "7.14, 14.29 … 92.86".
+/// Positions in short: "33.33, 66.67", "7.14, 14.29 … 92.86".
 fn run_of(positions: &[Position]) -> String {
     let shown = |position: &Position| mm(position.x_m);
     match positions {
@@ -177,7 +172,7 @@ fn run_of(positions: &[Position]) -> String {
     }
 }
 
-/// Share of seeds below which a claim that is true of the medians gets a remark.
+/// Share of seeds below which a true claim gets a remark.
 const MOST_SEEDS: f64 = 0.5;
 
 impl Paper<'_> {
@@ -323,10 +318,10 @@ fn share(share: f64) -> String {
     format!("{:.0} %", share * 100.0)
 }
 
-/// Young's modulus as the paper prints it, in pascals.
+/// As the paper prints it, in pascals.
 const PRINTED_MODULUS_PA: f64 = 200e6;
 
-/// Statement of the paper about each setting of the network, by key, in the order of the table.
+/// Statement of the paper about each setting of the network.
 const OF_THE_NETWORK: [(&str, &str); 13] = [
     ("input_scale", "not stated"),
     ("biases", "not stated"),
@@ -372,7 +367,6 @@ impl Paper<'_> {
             .caption(html! { "Settings of this study and of the paper." })
     }
 
-    /// Remark on the deflection with the printed modulus, unless the study uses it.
     fn why_not_the_printed_modulus(&self) -> Markup {
         let Some((_, beam, force_n)) = self.setup() else { return Markup::default() };
         if (beam.youngs_modulus_pa() / PRINTED_MODULUS_PA - 1.0).abs() < 1e-6 {
@@ -393,7 +387,6 @@ impl Paper<'_> {
         }
     }
 
-    /// Setting with this key, and its values in all arms.
     fn network_row(&self, key: &str, paper: &str) -> Option<[String; 3]> {
         let arms = self.report.study.study.arms.iter();
         let found: Vec<Setting> = arms

@@ -10,7 +10,6 @@ const GREEN: &str = "#009e73";
 const SPRING: BeamSupportKind =
     BeamSupportKind::Elastic { stiffness_n_per_m: 1e3, rotational_stiffness_nm_per_rad: None };
 
-/// A simply supported beam of 400 mm with a half wave as its deflection.
 fn beam(sensors: usize, load_mm: f64, width_px: u32) -> BeamDrawing {
     let length_mm = 400.0;
     let wave = |x: f64| -3.47 * (std::f64::consts::PI * x / length_mm).sin();

@@ -30,7 +30,6 @@ fn log_line(points: &[(f64, f64)]) -> Chart {
     Chart { y: Axis::log10("error, mm"), ..one_line(points) }
 }
 
-/// One series of every kind, and marks.
 fn everything(labels: [&str; 6]) -> Chart {
     let xs = [10.0, 20.0, 30.0];
     let band = xs.map(|x| BandPoint { x, low: 0.1 * x, high: x }).to_vec();

@@ -15,9 +15,9 @@ use crate::drawing::text;
 
 struct Drawing {
     image: Rect,
-    /// Texts and the boxes of their lines, with the estimated width.
+    /// Texts and the estimated boxes of their lines.
     texts: Vec<(String, Rect)>,
-    /// Boxes of lines and shapes, with their strokes.
+    /// Strokes and boxes of lines and shapes.
     shapes: Vec<(Paint, Rect)>,
 }
 
@@ -89,7 +89,6 @@ fn bounding_box(points: &[(f64, f64)], margin: f64) -> Rect {
     Rect { left: least(|at| at.0), right: most(|at| at.0), top: least(|at| at.1), bottom: most(|at| at.1) }
 }
 
-/// Returns true if two boxes share more than a tenth of a pixel in both directions.
 fn overlap(a: &Rect, b: &Rect) -> bool {
     let across = a.right.min(b.right) - a.left.max(b.left);
     let down = a.bottom.min(b.bottom) - a.top.max(b.top);

@@ -44,7 +44,6 @@ impl Run {
     }
 }
 
-/// The paper's study with a few epochs.
 fn quick_paper() -> String {
     let text = paper::STUDY_TOML.replace("max_epochs = 1_000_000", "max_epochs = 50");
     assert!(text.contains("max_epochs = 50"));
@@ -69,7 +68,6 @@ fn attributes<'a>(html: &'a str, name: &str) -> Vec<&'a str> {
     html.split(&start).skip(1).filter_map(|rest| rest.split('"').next()).collect()
 }
 
-/// Text between the tags, without styles.
 fn shown_text(html: &str) -> String {
     let body = html.split_once("<body>").unwrap().1;
     body.split('<')
@@ -202,7 +200,6 @@ fn a_study_of_sensors_shows_its_layouts_and_the_limit() {
     assert!(!text.contains("iterations") && !text.contains("did not converge"), "{text}");
 }
 
-/// Rig of the paper with a few epochs.
 fn quick_rig(max_epochs: u32) -> Rig {
     let mut rig = Rig::from_toml(include_str!("../../../../examples/paper.toml")).unwrap();
     let Estimator::Network(network) = &mut rig.estimator else { panic!("the paper has a network") };
@@ -261,7 +258,6 @@ fn an_evaluation_of_nothing_has_a_report() {
     assert_sound(&files, 2);
 }
 
-/// Report of the limit of the paper's beam with these sensors.
 fn limits(sensors: SensorGroup, force: Force) -> Vec<ReportFile> {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0)).unwrap();
     let setup = Setup::new(beam).sensors(sensors).unwrap();

@@ -1,35 +1,29 @@
-//! Where to look: the misfit at every STRIDE-th node, its valleys, and where in a valley to start.
+//! Coarse search: χ² at every STRIDE-th node, its local minima, and the starts of their refinement.
 //!
-//! Symbols as in [`super::search`]. At a known force a chord joins the influences of two neighbouring coarse nodes, times the force.
-//! How close d comes to a chord is a quadratic in the misfits at its ends; how far the curve strays from its chord is known
-//! beforehand, so a valley's lowest misfit is bounded from below without going there. With the force free, a place follows from the
-//! direction of d alone: between the directions of f at two neighbouring coarse nodes, the least-squares mixture α·f + β·g of both lies at
-//! t = β/(α + β) of the way from one to the other, and the best force is that of the mixture.
+//! Symbols as in [`super::search`]. At a known force, the distance of d from chords between neighbouring
+//! nodes and the curve's deviation from them bound χ² from below. Otherwise the least-squares mixture
+//! α·f + β·g of two nodes gives the place t = β/(α + β), and the force.
 
 use super::table::InfluenceTable;
 use crate::influence::config::ForceBelief;
 use crate::status::LINE_PLACES;
 use palpate_numerics::simd::{Abreast, Eight, Number};
 
-/// The search looks at every so many nodes; misfits between them are smooth.
+/// χ² is smooth between these nodes.
 pub(super) const STRIDE: usize = 4;
 
-/// Number of nodes that it looks at.
 pub(super) const COARSE: usize = (InfluenceTable::NODES - 1) / STRIDE + 1;
 const _: () = assert!(COARSE == LINE_PLACES, "estimators count the places along a line alike");
 
-/// Nodes are searched eight side by side.
 const BLOCKS: usize = COARSE.div_ceil(8);
 
-/// Valleys that may matter; more never compete in practice.
 pub(super) const MOST_MINIMA: usize = 4;
 
-/// A reading's misfits along the surface.
 #[derive(Clone, Debug)]
 pub(super) struct Profile {
-    /// The misfit at every coarse node, after an infinite one and before others that fill up.
+    /// χ² by node after one infinite value, with infinite padding.
     misfits: [f64; 8 * BLOCKS + 2],
-    /// d·f at every coarse node.
+    /// d·f.
     products: [[f64; 8]; BLOCKS],
 }
 
@@ -40,12 +34,10 @@ impl Default for Profile {
 }
 
 impl Profile {
-    /// The misfit at every coarse node.
     pub fn misfits(&self) -> &[f64; COARSE] {
         self.misfits[1..].first_chunk().expect("there are at least so many")
     }
 
-    /// The lowest valleys and how many, lowest first: nodes no higher than both neighbours.
     #[inline(always)]
     pub fn valleys<V: Eight>(&self) -> ([usize; MOST_MINIMA], usize) {
         let (left, here, right) =
@@ -77,52 +69,45 @@ impl Profile {
     }
 }
 
-/// The influences at the coarse nodes and between them.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Coarse {
     force: ForceBelief,
-    /// f, channel by channel, padded with zeros to groups of eight channels.
+    /// f by channel, zero-padded to groups of eight.
     influences: Vec<[[f64; 8]; BLOCKS]>,
-    /// Terms of the misfit beside |d|² and the product: |W·f|² where W is known; infinite where no node is.
+    /// |W·f|² at a known W, else 0; infinite padding.
     own: [[f64; 8]; BLOCKS],
     /// 1/(|f|² + the force's precision).
     inverse_norms: [[f64; 8]; BLOCKS],
     /// |f|².
     norms: Vec<f64>,
-    /// Number k lies before node k; the first and the last lie beyond the ends.
+    /// Chord k precedes node k.
     chords: Vec<Chord>,
-    /// Distance between coarse nodes.
     h_m: f64,
 }
 
-/// Chord between two coarse nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Chord {
-    /// The product of f at the ends.
+    /// Product of f at both ends.
     cross: f64,
-    /// The chord's squared length, and one over twice that.
+    /// Squared length, and 1/(2·square).
     square: f64,
     half_inverse: f64,
-    /// Largest distance of the curve from the chord.
+    /// Largest deviation of the curve.
     sag: f64,
-    /// The least weight of a channel.
     least_weight: f64,
 }
 
-/// Beyond an end: no way leads there.
 const BEYOND: Chord = Chord { cross: 0.0, square: 0.0, half_inverse: 1.0, sag: 0.0, least_weight: 1.0 };
 
-/// Start of the refinement in a valley, of one or eight readings.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Start<N = f64> {
     pub x_m: N,
     pub force_n: N,
-    /// A misfit below which the valley does not go.
+    /// Lower bound of χ².
     pub floor: N,
 }
 
 impl Coarse {
-    /// Coarse nodes of a whitened table; `weights` of every cell's channels, padded to groups of eight.
     pub fn new(table: &InfluenceTable, weights: &[[f64; 8]], force: ForceBelief) -> Self {
         let at = |node: usize| table.at_node(STRIDE * node);
         let groups = table.sensors.div_ceil(8);
@@ -149,7 +134,7 @@ impl Coarse {
         Self { force, influences, own, inverse_norms, norms, chords, h_m }
     }
 
-    /// The misfit at every coarse node, with the best force there, of a reading that was whitened to length `square`.
+    /// Computes χ² at the best force; `square` is |d|².
     #[inline(always)]
     pub fn scan<V: Eight>(&self, square: f64, whitened: &[[f64; 8]], profile: &mut Profile) {
         let mut products = [V::splat(0.0); BLOCKS];
@@ -179,7 +164,6 @@ impl Coarse {
         }
     }
 
-    /// Start of the refinement in a valley of each reading, `nodes` being their lowest places.
     #[inline(always)]
     pub fn start<V: Eight, N: Abreast<V>>(
         &self,
@@ -211,7 +195,7 @@ impl Coarse {
         Start { x_m, force_n, floor: N::from_lanes(&floors) }
     }
 
-    /// Distance from `node`, in coarse nodes, at which a chord comes closest to d, and the least misfit that its curve may have.
+    /// Distance from `node` to the closest chord point, in coarse nodes, and the lower bound of χ².
     #[inline(always)]
     fn along_chords(&self, profile: &Profile, node: usize) -> (f64, f64) {
         let here = profile.misfits[node + 1];
@@ -222,7 +206,6 @@ impl Coarse {
         (t, left.floor(left_square).min(right.floor(right_square)))
     }
 
-    /// The two mixtures between which a reading's direction lies, at the valley at `node`.
     #[inline(always)]
     fn mixture(&self, profile: &Profile, node: usize) -> Mixture<f64> {
         let product = |node: usize| profile.products.as_flattened()[node];
@@ -244,10 +227,10 @@ impl Coarse {
 }
 
 impl Chord {
-    /// Between coarse node `node` − 1 and `node`, of influences times `scale`; `weights` of its cells.
+    /// Chord between coarse nodes `node` − 1 and `node`, times `scale`.
     fn new(table: &InfluenceTable, node: usize, scale: f64, weights: &[[f64; 8]]) -> Self {
         const PARTS: usize = 32;
-        // The curve between the places that are looked at.
+        // Allowance for the curve between the evaluated parts.
         const MARGIN: f64 = 1.1;
         let (from, to) = (table.at_node(STRIDE * (node - 1)), table.at_node(STRIDE * node));
         let ends = || from.iter().zip(to);
@@ -268,15 +251,13 @@ impl Chord {
         }
     }
 
-    /// Distance from the end with misfit `here`, no higher than the misfit at the other, at which the chord comes closest to d,
-    /// and the square of how close.
+    /// Distance of the closest point from the end with `here` ≤ `other`, and its χ².
     #[inline(always)]
     fn closest(&self, here: f64, other: f64) -> (f64, f64) {
         let t = (0.5 + (here - other) * self.half_inverse).max(0.0);
         (t, (here - t * t * self.square).max(0.0))
     }
 
-    /// The least misfit on the curve, where the chord comes as close as the root of `square`.
     #[inline(always)]
     fn floor(&self, square: f64) -> f64 {
         let least = (square.sqrt() - self.sag).max(0.0);
@@ -284,28 +265,23 @@ impl Chord {
     }
 }
 
-/// Share of the next node's |f|² below which, next to a support, the direction of f is that of the next node's.
+/// Ratio of |f|² next to a support, below which f has the direction of the next node.
 const END: f64 = 1e-2;
 
-/// A reading between the influences f at its lowest coarse node and g at the node beside it.
+/// Products with f at the lowest node and g at a neighbour.
 #[derive(Clone, Copy, Debug, Default)]
 struct Mixture<N> {
-    /// d·f.
     pub product: N,
-    /// |f|².
     pub norm: N,
-    /// d·g.
     pub other_product: N,
-    /// |g|².
     pub other_norm: N,
     /// f·g.
     pub cross: N,
-    /// 1 where the other node is to the right, −1 where it is to the left.
+    /// 1 for a neighbour to the right, −1 to the left.
     pub towards: N,
 }
 
 impl Mixture<f64> {
-    /// Those of readings side by side.
     #[inline(always)]
     pub fn abreast<V: Copy, N: Abreast<V>>(each: &N::Each<Self>) -> Mixture<N> {
         let of = |part: fn(&Self) -> f64| {
@@ -325,7 +301,7 @@ impl Mixture<f64> {
 }
 
 impl<N: Number> Mixture<N> {
-    /// Distance from the lowest node, in coarse nodes, of the mixture that is closest to d, and its best force.
+    /// Distance of the best mixture from the lowest node, in coarse nodes, and the force.
     #[inline(always)]
     pub fn mix(&self, force: ForceBelief) -> (N, N) {
         let n = N::splat;

@@ -1,60 +1,48 @@
-//! Gauss–Newton on the place of one contact, and on its force where that is not known: of one reading, or of eight at
-//! once.
+//! Gauss–Newton refinement of the place of one contact, and of the force where it is not known.
 //!
-//! Symbols as in [`super::search`]. `V` holds eight channels of a reading, `N` a number each of one or eight readings.
+//! Symbols as in [`super::search`]; `V` are eight channels of a reading, `N` one value of one or eight
+//! readings.
 //!
-//! How far a step may go to be the last: all weighted, and m a step of the position, σ² the position's variance, |e|² = χ².
-//! Where the force is not known it is the best at its place, and makes up for the part of f′ along f, which is c·f; g is
-//! the rest. A step takes W·f(a) for straight. What it leaves out is, along g, W·|g|·(½f″·g/|g|² − c)·m², and as f″ turns g, a
-//! residual across f and g is taken for a step of m·(e·f″)/(W·|g|²). So with κ the larger of |½f″·g/|g|² − c| and
-//! |f″ across f and g|/|g|, the position is off by less than κ|m|·(|m| + σ|e|); mostly much less, as a residual of noise
-//! is hardly ever along f″. Along f, where the force follows as W/(1 + c·m), it leaves out W·|f|·λ·m² with
-//! λ = |½f″·f|/|f|².
+//! Termination (weighted; m step and σ² variance of the position, |e|² = χ²): at the best force,
+//! f′ = c·f + g. A step omits W·|g|·(½f″·g/|g|² − c)·m² along g, and m·(e·f″)/(W·|g|²) by the rotation of g:
+//! with κ the larger of |½f″·g/|g|² − c| and |f″ across f and g|/|g|, an error below κ|m|·(|m| + σ|e|). Along
+//! f, with the force W/(1 + c·m), a step omits W·|f|·λ·m², λ = |½f″·f|/|f|².
 
 use super::table::{Cell, InfluenceTable, Spacing};
 use crate::influence::config::ForceBelief;
 use palpate_numerics::simd::{Abreast, Eight, Number};
 use palpate_numerics::small::add_outer;
 
-/// Gauss–Newton over a whitened table.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct GaussNewton {
     pub spacing: Spacing,
-    /// Groups of eight channels.
     pub groups: usize,
-    /// f and f′ at every node, in groups of eight channels.
+    /// f and f′ by node and group.
     pub rows: Vec<[[f64; 8]; 2]>,
-    /// 1/(1 + v) in every cell, v the calibration's variance of a reading over the noise's at the known force or the
-    /// calibration's, in groups of eight channels.
+    /// 1/(1 + v) by cell and group, v the calibration's variance over the noise's.
     pub weights: Vec<[f64; 8]>,
-    /// Curvature of the influences in every cell.
     curvatures: Vec<Curvature>,
-    /// Ends of the places that are searched: the surface's, or a little before.
     pub ends_m: [f64; 2],
     length_m: f64,
     force: ForceBelief,
-    /// The calibration's mean force, in newtons, and one over it: its offsets are as uncertain as its influences at this force.
+    /// Mean force of the calibration.
     reference_force_n: f64,
     inverse_reference: f64,
 }
 
-/// A minimum of the misfit, or one each of several readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Minimum<N = f64> {
     pub x_m: N,
     pub force_n: N,
-    /// χ² there.
     pub misfit: N,
-    /// Variance of the position, covariance of position and force, variance of the force.
+    /// Variance of position, covariance, variance of force.
     pub covariance: [N; 3],
 }
 
-/// Forces beyond so many times the calibration's are taken for no less certain: an immense force next to a support, of
-/// which the calibration says nothing, would else explain every reading.
+/// Limit of the variances' growth: an immense force next to a support would otherwise explain every reading.
 const MOST_GROWTH: f64 = 10.0;
 
 impl GaussNewton {
-    /// Over a whitened table, with what is known of the force and the calibration's mean force.
     pub fn new(table: &InfluenceTable, force: ForceBelief, reference_force_n: f64) -> Self {
         let weights = weights(table, force.weights_force_n(reference_force_n));
         let group = |numbers: &[f64]| grouped(numbers, table.sensors, 0.0);
@@ -72,7 +60,7 @@ impl GaussNewton {
         }
     }
 
-    /// Factor of the table's variances by a contact's force, of a contact that presses harder than the calibration did.
+    /// Factor of the variances at forces above the calibration's.
     #[inline(always)]
     pub fn grown<N: Number>(&self, force_n: N) -> N {
         let ratio =
@@ -80,17 +68,16 @@ impl GaussNewton {
         ratio * ratio
     }
 
-    /// Factor of the table's variances, which are those per newton, for a contact of a force.
+    /// Factor of the table's variances, which are per newton.
     pub fn variance_scale(&self, force_n: f64) -> f64 {
         self.grown(force_n) * self.reference_force_n * self.reference_force_n
     }
 
-    /// Mean force of the calibration, in newtons.
     pub fn reference_force_n(&self) -> f64 {
         self.reference_force_n
     }
 
-    /// 1/(1 + v) of each channel in a cell, for a contact of a force.
+    /// 1/(1 + v) of each channel in a cell.
     pub fn weights_at(&self, cell: &Cell<f64>, force_n: f64) -> impl Fn(usize) -> f64 {
         let first = cell.node as usize * self.groups;
         let grown = self.weights_grown(force_n);
@@ -100,9 +87,7 @@ impl GaussNewton {
         }
     }
 
-    /// The minima near `x_m`, by at most so many `steps`, and the bits of those readings that came to theirs.
-    ///
-    /// `whitened` holds the readings one after the other.
+    /// Returns the minima near `start`, and a bit for each converged reading.
     #[inline(always)]
     pub fn minimum<V: Eight, N: Abreast<V>>(
         &self,
@@ -144,7 +129,6 @@ impl GaussNewton {
         (minimum, arrived)
     }
 
-    /// Curvature of the influences in the cell after a node.
     #[inline(always)]
     fn curvature<V: Eight, N: Abreast<V>>(&self, node: N) -> Curvature<N> {
         let (mut kappa_square, mut lambda_square) = (N::each(0.0), N::each(0.0));
@@ -156,14 +140,14 @@ impl GaussNewton {
         Curvature { kappa_square: N::from_lanes(&kappa_square), lambda_square: N::from_lanes(&lambda_square) }
     }
 
-    /// Whether the calibration's variance counts alike, to a twentieth, for two forces.
+    /// True where the calibration's variances at both forces agree to 5 %.
     #[inline(always)]
     fn weighs_alike<N: Number>(&self, a_n: N, b_n: N) -> u8 {
         let (a, b) = (self.weights_grown(a_n), self.weights_grown(b_n));
         a.max(b).at_most(N::splat(1.05) * a.min(b))
     }
 
-    /// Factor of the calibration's variance over what the weights have of it.
+    /// Growth of the variance relative to `weights`.
     #[inline(always)]
     pub fn weights_grown<N: Number>(&self, force_n: N) -> N {
         match self.force {
@@ -172,7 +156,6 @@ impl GaussNewton {
         }
     }
 
-    /// The sums of the normal equations at a place; of those about the force only where it is not known.
     #[inline(always)]
     fn sums<V: Eight, N: Abreast<V>>(&self, whitened: &[[f64; 8]], cell: Cell<N>, force_n: N) -> Sums<N> {
         let points = Points::new::<V, N>(cell, force_n);
@@ -195,8 +178,7 @@ impl GaussNewton {
         Sums { square, gg, eg, ff, fg, ef }
     }
 
-    /// Sums of e², g², eg, f², fg and ef of one reading, summed over groups of eight channels. The calibration's variance counts
-    /// `grown` times; not given where the force is known, as the weights are then those for that force.
+    /// Sums of e², g², eg, f², fg and ef; `grown` multiplies the calibration's variance.
     #[inline(always)]
     fn sums_by_channel<V: Eight>(&self, whitened: &[[f64; 8]], place: &Point, grown: Option<f64>) -> [V; 6] {
         let [mut square, mut gg, mut eg, mut ff, mut fg, mut ef] = [V::splat(0.0); 6];
@@ -225,14 +207,13 @@ impl GaussNewton {
 }
 
 impl<N: Number> Minimum<N> {
-    /// That of a reading without any.
     #[inline(always)]
     pub fn nowhere() -> Self {
         let (zero, infinity) = (N::splat(0.0), N::splat(f64::INFINITY));
         Self { x_m: zero, force_n: zero, misfit: infinity, covariance: [infinity, zero, infinity] }
     }
 
-    /// `self` where the reading's bit is set, `other` where it is not.
+    /// Selects `self` where the reading's bit is set.
     #[inline(always)]
     pub fn or(self, bits: u8, other: Self) -> Self {
         let [xx, xf, ff] = self.covariance;
@@ -249,7 +230,6 @@ impl<N: Number> Minimum<N> {
     }
 }
 
-/// The lowest misfit so far, where it was, and how much of a step is taken.
 struct Backtracking<N> {
     x_m: N,
     force_n: N,
@@ -258,8 +238,7 @@ struct Backtracking<N> {
 }
 
 impl<N: Number> Backtracking<N> {
-    /// The next place and force to try after a place, where the best step of the position is `step_m`: where the misfit
-    /// has risen, half way back, and steps are shorter from then on.
+    /// After a rise of χ², half way back with shorter steps.
     #[inline(always)]
     fn next(&mut self, (x_m, force_n): (N, N), normal: &Normal<N>, step_m: N) -> (N, N) {
         let (half, fell) = (N::splat(0.5), normal.misfit.at_most(self.misfit));
@@ -273,14 +252,12 @@ impl<N: Number> Backtracking<N> {
     }
 }
 
-/// Point at which the normal equations of a reading are taken: its cell and the force.
 struct Point {
     reading: usize,
     cell: Cell<f64>,
     force_n: f64,
 }
 
-/// The places of all readings, number by number.
 struct Points<L> {
     cell: Cell<L>,
     force_n: L,
@@ -311,7 +288,6 @@ impl<L: AsRef<[f64]>> Points<L> {
     }
 }
 
-/// f and f′ in a cell, from values and slopes at its ends.
 #[inline(always)]
 pub(super) fn interpolate<V: Eight>(cell: &Cell<f64>, left: &[[f64; 8]; 2], right: &[[f64; 8]; 2]) -> (V, V) {
     let at = [V::load(&left[0]), V::load(&right[0]), V::load(&left[1]), V::load(&right[1])];
@@ -330,7 +306,7 @@ fn grow<V: Eight>(weight: V, grown: V) -> V {
     weight / (weight + grown * (V::splat(1.0) - weight))
 }
 
-/// Sums over channels at a place: e = d − W·f the residual, g = f′, each weighted by the calibration's own variance.
+/// Weighted sums over channels: e = d − W·f, g = f′.
 #[derive(Clone, Copy)]
 struct Sums<N> {
     square: N,
@@ -341,19 +317,16 @@ struct Sums<N> {
     eg: N,
 }
 
-/// The normal equations of the position, the force being known or the best there.
 struct Normal<N> {
     force_n: N,
-    /// χ².
     misfit: N,
-    /// Half of how χ² falls along the position, and its curvature.
+    /// −½·dχ²/da and ½·d²χ²/da².
     fall: N,
     curvature: N,
-    /// Cramér–Rao: variance of position, covariance, variance of force; infinite where nothing is told.
+    /// Cramér–Rao covariance; infinite where undetermined.
     covariance: [N; 3],
-    /// The best step of the position.
     step_m: N,
-    /// c, and W²·|f|²; 0 where the force is known.
+    /// c, and W²·|f|²; 0 at a known force.
     along_f: N,
     signal: N,
 }
@@ -384,7 +357,7 @@ impl<N: Number> Normal<N> {
         }
     }
 
-    /// The sums were taken with some force; as the residual is linear in it, they tell the best, and what they are there.
+    /// Uses the linearity of the residual in the force.
     #[inline(always)]
     fn at_best_force(sums: &Sums<N>, some_n: N, belief: ForceBelief) -> Self {
         let (zero, one, infinity) = (N::splat(0.0), N::splat(1.0), N::splat(f64::INFINITY));
@@ -395,7 +368,7 @@ impl<N: Number> Normal<N> {
         let force_n = (some_n + score * inverse_ww).max(zero);
         let change = force_n - some_n;
         let misfit = sums.square + precision * off * off - change * (N::splat(2.0) * score - ww * change);
-        // Information about the position, about both, and about the position when the force is not known.
+        // Information about the position, about both, and about the position at unknown force.
         let (aa, aw) = (force_n * force_n * sums.gg, force_n * sums.fg);
         let along_w = aw * inverse_ww;
         let curvature = aa - aw * along_w;
@@ -414,19 +387,17 @@ impl<N: Number> Normal<N> {
         }
     }
 
-    /// The best force after a step: |f| has then grown by 1 + c·m.
+    /// Best force after a step: |f| grows by 1 + c·m.
     #[inline(always)]
     fn force_after(&self, step_m: N) -> N {
         self.force_n / (N::splat(1.0) + self.along_f * step_m).max(N::splat(0.25))
     }
 
-    /// χ² after a step.
     #[inline(always)]
     fn misfit_after(&self, step_m: N) -> N {
         self.misfit - step_m * (N::splat(2.0) * self.fall - self.curvature * step_m)
     }
 
-    /// The numbers by which a step to `to` may be the last.
     #[inline(always)]
     fn step(&self, step_m: N, to: &Minimum<N>) -> Step<N> {
         let variance = self.covariance[0];
@@ -434,37 +405,33 @@ impl<N: Number> Normal<N> {
     }
 }
 
-/// Curvature of the influences in a cell of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Curvature<N = f64> {
     /// κ², in m⁻².
     pub kappa_square: N,
-    /// λ², in m⁻⁴; 0 where the force is known.
+    /// λ², in m⁻⁴; 0 at a known force.
     pub lambda_square: N,
 }
 
-/// A step to a minimum.
 #[derive(Clone, Copy, Debug)]
 struct Step<N> {
     /// m².
     pub square: N,
     /// σ².
     pub variance: N,
-    /// χ² after the step.
     pub misfit: N,
-    /// W²·|f|²; 0 where the force is known.
+    /// W²·|f|²; 0 at a known force.
     pub signal: N,
 }
 
 impl<N: Number> Curvature<N> {
-    /// Whether a step leaves so little that it may be the last, a bit for each reading: less than a twentieth of the
-    /// position's standard deviation along g, and less than a tenth of the misfit's unit along f. The calibration's
-    /// variance counts `grown` times as much as where κ was found, and weighs channels against each other by no more.
+    /// Bits of the readings with a final step: an error below a twentieth of σ along g, and below 0.1 of χ²
+    /// along f.
     #[inline(always)]
     pub fn allows(&self, step: &Step<N>, grown: N) -> u8 {
         const SHARE_OF_SD: f64 = 0.05;
         const MISFIT: f64 = 0.1;
-        // Two: the square of a sum is at most twice the sum of squares.
+        // (a + b)² ≤ 2·(a² + b²).
         let share = N::splat(SHARE_OF_SD * SHARE_OF_SD / 2.0);
         let off =
             self.kappa_square * grown * grown * step.square * (step.square + step.variance * step.misfit);
@@ -473,7 +440,6 @@ impl<N: Number> Curvature<N> {
     }
 }
 
-/// Curvature of a whitened table in every cell; `weights` of the cells' channels, in groups of eight.
 fn curvatures(table: &InfluenceTable, weights: &[[f64; 8]], force: ForceBelief) -> Vec<Curvature> {
     const PARTS: usize = 4;
     let groups = table.sensors.div_ceil(8);
@@ -493,7 +459,7 @@ fn curvatures(table: &InfluenceTable, weights: &[[f64; 8]], force: ForceBelief) 
         .collect()
 }
 
-/// At part `t` of a cell; infinite where a reading does not tell the position.
+/// Curvature at part `t` of a cell; infinite where the position is undetermined.
 fn curvature(table: &InfluenceTable, weights: &[f64], force: ForceBelief, cell: usize, t: f64) -> Curvature {
     let h_m = table.spacing_m();
     let place = Cell { node: cell as f64, ..table.spacing().cell(t * h_m) };
@@ -506,7 +472,7 @@ fn curvature(table: &InfluenceTable, weights: &[f64], force: ForceBelief, cell: 
         add_outer(&mut products, weights[s], &[f, slope, bent]);
     });
     let [[ff, fs, fb], [_, ss, sb], [.., bb]] = products;
-    // What of f′ and of f″ is along f, per f.
+    // Parts of f′ and f″ along f, per f.
     let [c, along_f] = match force {
         ForceBelief::Known(_) => [0.0; 2],
         _ => [fs / ff, fb / ff],
@@ -521,8 +487,8 @@ fn curvature(table: &InfluenceTable, weights: &[f64], force: ForceBelief, cell: 
     if told { curvature } else { Curvature { kappa_square: f64::INFINITY, lambda_square: f64::INFINITY } }
 }
 
-/// Ends of the places that are searched. Next to a support a contact of unknown force reads like a stronger one that is nearer, and at the
-/// support like an infinite one, so a tenth of a spacing is kept.
+/// Ends of the search: at unknown force, a tenth of a spacing is excluded next to a support, where the best
+/// force diverges.
 fn ends_m(table: &InfluenceTable, force: ForceBelief) -> [f64; 2] {
     let last = table.nodes() - 1;
     let square = |node: usize| table.at_node(node).iter().map(|f| f * f).sum::<f64>();
@@ -533,7 +499,6 @@ fn ends_m(table: &InfluenceTable, force: ForceBelief) -> [f64; 2] {
     [kept(0, 1), table.length_m - kept(last, last - 1)]
 }
 
-/// 1/(1 + v) in every cell of a whitened table, for a contact of a force.
 fn weights(table: &InfluenceTable, force_n: f64) -> Vec<[f64; 8]> {
     let (left, right) = (&table.variances[..], &table.variances[table.sensors..]);
     let cells = left.iter().zip(right);
@@ -541,14 +506,13 @@ fn weights(table: &InfluenceTable, force_n: f64) -> Vec<[f64; 8]> {
     grouped(&weights, table.sensors, 1.0)
 }
 
-/// Rows of `width` numbers, each in groups of eight that are filled up.
+/// Splits rows of `width` numbers into padded groups of eight.
 pub(super) fn grouped(numbers: &[f64], width: usize, filler: f64) -> Vec<[f64; 8]> {
     let rows = numbers.chunks_exact(width).flat_map(|row| row.chunks(8));
     let group = |part: &[f64]| std::array::from_fn(|i| part.get(i).copied().unwrap_or(filler));
     rows.map(group).collect()
 }
 
-/// Two lists of groups, group by group.
 pub(super) fn paired(first: Vec<[f64; 8]>, second: Vec<[f64; 8]>) -> Vec<[[f64; 8]; 2]> {
     first.into_iter().zip(second).map(|(a, b)| [a, b]).collect()
 }
@@ -559,8 +523,8 @@ mod tests {
 
     #[test]
     fn a_circle_bends_as_its_radius_says() {
-        // Two channels that go round a circle in 40 m, cosine and sine: f″ is across f′ and (2π/40)² of f, which a
-        // change of the force makes up for.
+        // Two channels on a circle with a circumference of 40 m: f″ is across f′ and (2π/40)² of f, which a
+        // change of the force compensates.
         let turn = std::f64::consts::TAU / 40.0;
         let nodes = || (0..401).map(|node| f64::from(node) * 0.1 * turn);
         let table = InfluenceTable {

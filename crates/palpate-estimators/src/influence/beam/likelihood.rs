@@ -1,11 +1,10 @@
-//! How well contacts explain a reading, by the table of influence functions.
+//! Likelihood of contacts on a line, for tracking.
 //!
-//! Symbols: d whitened reading (less offsets, over the noise), f whitened influence and f′ its slope, W force, v variance
-//! of f from calibration; u the first mode's force, φ its shape and g what the sensors read per newton of it.
-//! χ² = Σ w·(d − Σ W·f − (u − Σ W·φ)·g)², with w = 1/(1 + Σ W²·v), as where a single reading is located.
+//! d whitened reading, f whitened influence, f′ its slope, W force, v variance of f from calibration; u the
+//! first mode's force, φ its shape, g the reading per newton of it: χ² = Σ w·(d − Σ W·f − (u − Σ W·φ)·g)²,
+//! w = 1/(1 + Σ W²·v).
 //!
-//! g needs no mechanics: a sensor's influence function is f(x) = Σ_k s_k·φ_k(x)/(m_k·ω_k²), with s_k what it reads of mode k,
-//! so g = s₁/(m₁·ω₁²) = (2/l)·∫f·φ dx is the share of the first mode in the table itself.
+//! As f(x) = Σ_k s_k·φ_k(x)/(m_k·ω_k²), with s_k the reading of mode k, g = s₁/(m₁·ω₁²) = (2/l)·∫f·φ dx.
 
 use super::locator::BeamLocator;
 use super::multi_contact::{contact_fit, first_mode};
@@ -23,7 +22,7 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::simd::Array;
 use palpate_numerics::small::{Ldl, add_outer, form};
 
-/// The likelihood of a [`BeamLocator`], ready to be asked often.
+/// Likelihood of a [`BeamLocator`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct BeamLikelihood {
     locator: BeamLocator,
@@ -34,7 +33,7 @@ pub struct BeamLikelihood {
 }
 
 impl BeamLikelihood {
-    /// The likelihood of the channels that a locator does not leave out.
+    /// Builds the likelihood of the channels in use.
     pub fn new(locator: &BeamLocator) -> Self {
         let table = &locator.search().table;
         let first_mode = (0..table.sensors).map(|s| share_of_first_mode(table, s)).collect();
@@ -46,19 +45,16 @@ impl BeamLikelihood {
         }
     }
 
-    /// The likelihood with the scatter and the drift of the untouched surface.
     #[must_use]
     pub(crate) fn with_untouched(self, untouched: UntouchedSurface) -> Self {
         Self { untouched, ..self }
     }
 
-    /// The likelihood with the check of the locator's intervals.
     #[must_use]
     pub(crate) fn with_interval_check(self, interval_check: Option<IntervalCheck>) -> Self {
         Self { interval_check, ..self }
     }
 
-    /// f, f′ and v of the channels in use.
     fn table(&self) -> &InfluenceTable {
         &self.locator.search().table
     }
@@ -73,13 +69,13 @@ impl BeamLikelihood {
         contact_fit(self.table(), whitened, contacts, |contact| self.scale(contact), mode)
     }
 
-    /// By what v is multiplied; a force that is hardly there was not calibrated better for that.
+    /// Factor of v; forces below the calibration's are not more certain.
     fn scale(&self, contact: Contact) -> f64 {
         contact.force_n.max(self.locator.channels().reference_force_n).powi(2)
     }
 }
 
-/// g of one sensor, by Simpson's rule over the nodes, whose number is odd.
+/// g of one sensor, by Simpson's rule over an odd number of nodes.
 fn share_of_first_mode(table: &InfluenceTable, sensor: usize) -> f64 {
     let last = table.nodes() - 1;
     let weight = |node: usize| match node {
@@ -130,8 +126,7 @@ impl Likelihood for BeamLikelihood {
         (0..self.table().sensors).map(|s| own(s).powi(2)).sum()
     }
 
-    /// A⁻¹·B·A⁻¹ with A = Σ w·j·jᵀ and B = Σ (w·j)·var·(w·j)ᵀ, j the derivatives by places and unknown forces in balance
-    /// and var = Σ W²·v.
+    /// A⁻¹·B·A⁻¹, A = Σ w·j·jᵀ, B = Σ (w·j)·var·(w·j)ᵀ, j the derivatives in balance, var = Σ W²·v.
     fn calibration_variance(&self, contacts: &[Contact]) -> [CalibrationVariance; 2] {
         let force_is_free = self.known_force_n().is_none();
         let cells: Vec<_> = contacts.iter().map(|contact| self.table().cell(contact.position.x_m)).collect();

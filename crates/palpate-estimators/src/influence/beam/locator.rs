@@ -1,14 +1,7 @@
-//! The fitted influence locator of a line with a model: from readings to estimates, one by one or eight at a time.
+//! Fitted influence locator of a line with a model.
 //!
-//! One reading alone is a chain: its misfits, its valleys, a place, sums over channels, a division, the next place. The
-//! machine waits for each. Of eight readings the chains run side by side: all that is done once a reading, places,
-//! divisions and the sums over channels, is done for eight readings in one register, by the code and with the order of
-//! sums that one reading has, so the estimates are the same to the last bit. A reading that needs more than the lowest
-//! of its valleys, or more than a few steps, goes through the search for one reading.
-//!
-//! Where the time goes, by sampling: about four tenths into what is still done reading by reading, the scan of coarse
-//! nodes, its valleys and where to start in them; about a quarter into the refinement of a known force, a third into that
-//! of an unknown one; the rest into whitening and writing estimates.
+//! Batches of eight have the order of sums of a single reading: their estimates are bitwise equal. Readings
+//! with competing minima or many steps fall back to the single search.
 
 use super::coarse::Profile;
 use super::gauss_newton::Minimum;
@@ -27,7 +20,7 @@ use palpate_mechanics::contact::Position;
 use palpate_numerics::simd::{Array, Eight, InstructionSet, Kernel, Simd};
 use serde::{Deserialize, Serialize};
 
-/// Influence functions in a table, ready to be inverted.
+/// Locator that inverts the influence functions of a line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct BeamLocator {
@@ -35,15 +28,13 @@ pub struct BeamLocator {
     search: Search,
 }
 
-/// The part of a locator that its file holds.
+/// Contents of a locator file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Stored {
-    /// Influence functions.
     table: InfluenceTable,
     channels: Channels,
     force: ForceBelief,
-    /// The most contacts at once.
     contacts: usize,
 }
 
@@ -57,7 +48,7 @@ impl BeamLocator {
         Stored { table, channels, force, contacts }.into_locator()
     }
 
-    /// [`Locate::locate`] with memory of the caller's.
+    /// Locates a reading with reusable memory.
     pub fn locate_with(&self, reading: &[f64], scratch: &mut Scratch) -> Estimate {
         let (search, mut estimate) = (&self.search, NO_CONTACT);
         let rows = Rows { readings: reading, channels: reading.len() };
@@ -71,11 +62,7 @@ impl BeamLocator {
         estimate
     }
 
-    /// Locates a contact in each reading: `readings` are one after the other, each with a value for every channel, and
-    /// each estimate is written over. As many as both hold are located, and their number is returned.
-    ///
-    /// An estimate is the one that [`BeamLocator::locate_with`] gives; of one that is used again, no more is written than
-    /// what is read.
+    /// Overwrites `estimates` with those of concatenated `readings`, and returns their number.
     pub fn locate_batch_with(
         &self,
         readings: &[f64],
@@ -94,58 +81,56 @@ impl BeamLocator {
         count
     }
 
-    /// The influence functions.
+    /// Returns the influence functions.
     pub fn table(&self) -> &InfluenceTable {
         &self.stored.table
     }
 
-    /// Offsets, noise, and which channels are left out.
     pub(in crate::influence) fn channels(&self) -> &Channels {
         &self.stored.channels
     }
 
-    /// Influence function, offset and noise of each channel, in its SI unit; `None` for those that are left out.
+    /// Returns influence function, offset and noise of each channel, in its SI unit; `None` for disabled
+    /// channels.
     pub fn influences(&self) -> impl Iterator<Item = Option<(FittedInfluence<'_>, f64, f64)>> {
         let Stored { table, channels: Channels { offsets, noise_sd, dead, .. }, .. } = &self.stored;
         (0..table.sensors).map(move |i| (!dead[i]).then(|| (table.function(i), offsets[i], noise_sd[i])))
     }
 
-    /// The influence functions with their uncertainty, at the nodes of the table.
+    /// Returns the influence functions with their uncertainty at the nodes.
     pub fn influences_at_nodes(&self) -> InfluencesAtNodes {
         let Stored { table, channels, .. } = &self.stored;
         let positions = (0..table.nodes()).map(|node| Position::along(table.node_m(node))).collect();
         InfluencesAtNodes::of_table(positions, channels, [&table.values, &table.variances])
     }
 
-    /// Knowledge of the force.
+    /// Returns the prior of the force.
     pub fn force(&self) -> ForceBelief {
         self.stored.force
     }
 
-    /// Offset of each channel, in its SI unit.
+    /// Returns the offset of each channel, in its SI unit.
     pub fn offsets(&self) -> &[f64] {
         &self.stored.channels.offsets
     }
 
-    /// Share of untouched readings that may be taken for a contact.
+    /// Returns the false-alarm rate of untouched readings.
     pub fn false_alarm_rate(&self) -> FalseAlarmRate {
         self.stored.channels.false_alarm_rate
     }
 
-    /// The most contacts that it looks for.
+    /// Returns the greatest number of contacts.
     pub fn contacts(&self) -> usize {
         self.stored.contacts
     }
 
-    /// Leaves channel `channel` (from 0) out of all sums from now on; false when no channel would be left, and then
-    /// nothing changes.
+    /// Disables channel `channel` (from 0); returns false, without a change, when no channel would remain.
     pub fn leave_out(&mut self, channel: usize) -> bool {
         let Some(channels) = self.stored.channels.without(channel) else { return false };
         *self = Stored { channels, ..self.stored.clone() }.into_locator();
         true
     }
 
-    /// The table that is searched, whitened.
     pub(super) fn search(&self) -> &Search {
         &self.search
     }
@@ -170,22 +155,19 @@ impl Locate for BeamLocator {
     }
 }
 
-/// Readings one after the other, of so many channels each.
 #[derive(Clone, Copy)]
 pub(super) struct Rows<'a> {
     pub readings: &'a [f64],
     pub channels: usize,
 }
 
-/// Steps that eight readings take together; a reading that is not at its minimum then would keep the others waiting.
+/// Steps of eight readings together; converged ones wait for the others.
 const MOST_STEPS: usize = 4;
 
-/// Writes the estimate of one contact for each row.
 pub(super) fn locate_rows(search: &Search, rows: Rows, scratch: &mut Scratch, estimates: &mut [Estimate]) {
     InstructionSet::best().run(LocateRows { search, rows, scratch, estimates });
 }
 
-/// The work of [`locate_rows`].
 pub(super) struct LocateRows<'a> {
     pub search: &'a Search,
     pub rows: Rows<'a>,
@@ -218,7 +200,6 @@ fn locate_each<V: Eight>(search: &Search, rows: Rows, scratch: &mut Scratch, est
     }
 }
 
-/// Writes the estimates of eight readings.
 #[inline(always)]
 fn locate_eight<V: Eight>(search: &Search, rows: Rows, scratch: &mut Scratch, estimates: &mut [Estimate; 8]) {
     let groups = search.groups();
@@ -254,7 +235,6 @@ fn locate_eight<V: Eight>(search: &Search, rows: Rows, scratch: &mut Scratch, es
     }
 }
 
-/// The minima of eight readings, reading by reading.
 #[inline(always)]
 fn one_by_one<V: Eight>(minima: &Minimum<V>) -> [Minimum; 8] {
     let [xx, xf, ff] = minima.covariance;
@@ -269,7 +249,7 @@ fn one_by_one<V: Eight>(minima: &Minimum<V>) -> [Minimum; 8] {
     each
 }
 
-/// Writes the estimate of one reading, and of a used estimate no more than what is read.
+/// Writes only those parts of a reused estimate that are read.
 #[inline(always)]
 fn locate_into<V: Eight>(search: &Search, reading: &[f64], scratch: &mut Scratch, estimate: &mut Estimate) {
     let square = search.whiten::<V>(reading, scratch.whitened.room(search.groups()));
@@ -283,7 +263,6 @@ impl Stored {
         BeamLocator { search: Search::new(&self.table, &self.channels, self.force), stored: self }
     }
 
-    /// Checks what a file may have got wrong.
     fn check(&self) -> Result<(), LocatorFault> {
         let Self { table, channels, .. } = self;
         let count = LocatorFault::check_count;

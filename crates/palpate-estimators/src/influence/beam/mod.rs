@@ -1,5 +1,4 @@
-//! Influence functions of a line with a model, and their inversion: a table of cubic curves, searched coarsely and refined by
-//! Gauss–Newton, for one contact or several.
+//! Influence functions of a line with a model, and their inversion for one contact or several.
 
 mod coarse;
 mod gauss_newton;
@@ -21,7 +20,6 @@ use super::learning::{LearntInfluence, NODES_EACH, learn};
 use crate::fit::FitTask;
 use palpate_mechanics::contact::Position;
 
-/// Fits the influence functions of a line with a model.
 pub(super) fn fit(config: Influence, task: FitTask) -> Result<BeamLocator, InfluenceFitError> {
     let mut table =
         InfluenceTable::empty(task.setup.layout().len(), task.setup.surface().extent().length_m());
@@ -45,7 +43,7 @@ pub(super) fn fit(config: Influence, task: FitTask) -> Result<BeamLocator, Influ
     Ok(BeamLocator::new(table, channels, config.force_belief(task.setup), config.contacts))
 }
 
-/// For each node a little to its left, itself, a little to its right.
+/// Places to the left of each node, at it, and to the right.
 fn around_nodes(table: &InfluenceTable) -> Vec<Position> {
     let h = 1e-5 * table.length_m;
     let around = |x_m: f64| [(x_m - h).max(0.0), x_m, (x_m + h).min(table.length_m)];

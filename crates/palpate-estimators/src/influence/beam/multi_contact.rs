@@ -1,9 +1,8 @@
-//! Several contacts at once.
+//! Several simultaneous contacts.
 //!
-//! A reading of K contacts is Σ W_k·f(a_k). Given the places, the forces are a linear least-squares problem, so places
-//! are searched over pairs and triples of nodes with the forces worked out, then refined by Gauss–Newton on all 2K
-//! numbers. How many there are is decided by the extended Bayesian information criterion (Chen and Chen, Biometrika 95,
-//! 2008), which also charges for the number of places that a contact could have been at.
+//! A reading is Σ W_k·f(a_k). Linear least squares gives the forces at all pairs or triples of nodes;
+//! Gauss–Newton refines the best. The extended Bayesian information criterion (Chen and Chen, Biometrika 95,
+//! 2008) selects their number.
 
 use super::coarse::{COARSE, STRIDE};
 use super::search::Search;
@@ -17,8 +16,7 @@ use palpate_numerics::small::{Ldl, dot};
 use palpate_numerics::{clamped_interval, normal_interval_95};
 use std::f64::consts::PI;
 
-/// The estimate of two to `most` contacts together, where they explain a whitened reading better than one with its `misfit` does; `None`
-/// where they do not.
+/// Estimates two to `most` contacts; `None` where one contact with χ² `misfit` is preferable.
 pub(super) fn locate_several(
     search: &Search,
     most: usize,
@@ -35,7 +33,7 @@ pub(super) fn locate_several(
         if cost < least {
             (least, best) = (cost, Some(together));
         }
-        // One more contact costs this much, and cannot take off more misfit than there is.
+        // One more contact costs more than the remaining χ².
         if one_more > misfit {
             break;
         }
@@ -52,16 +50,14 @@ pub(super) fn locate_several(
     Some(estimate)
 }
 
-/// Contacts that explain a reading together.
 #[derive(Clone, Debug, PartialEq)]
 struct MultiContact {
-    /// The contacts, strongest first; without uncertainty where the reading does not tell them.
+    /// Strongest first; without uncertainty where undetermined.
     contacts: Vec<ContactEstimate>,
-    /// χ² that is left.
     misfit: f64,
 }
 
-/// The best explanation of a whitened reading by `count` contacts, where that can be told at all.
+/// Fits `count` contacts; `None` where they are unidentifiable.
 fn explain(search: &Search, whitened: &[f64], count: usize) -> Option<MultiContact> {
     if 2 * count > search.live.len() {
         return None;
@@ -72,7 +68,6 @@ fn explain(search: &Search, whitened: &[f64], count: usize) -> Option<MultiConta
     }
 }
 
-/// Those of the `choices` of nodes whose influences explain the most, with every force greater than 0.
 fn best_nodes<const K: usize>(
     search: &Search,
     whitened: &[f64],
@@ -94,7 +89,7 @@ fn triples() -> impl Iterator<Item = [usize; 3]> {
     pairs().flat_map(|[i, j]| (j + 1..COARSE).map(move |k| [i, j, k]))
 }
 
-/// Reduction of |d|² by the chosen nodes, pᵀG⁻¹p; `None` where a force would be negative or the nodes cannot be told apart.
+/// Reduction of χ², pᵀG⁻¹p; `None` with a negative force or collinear nodes.
 #[inline]
 fn gain<const K: usize>(gram: &Array2<f64>, score: &[f64], chosen: [usize; K]) -> Option<f64> {
     let (mut own_gram, mut own_score) = ([[0.0; K]; K], [0.0; K]);
@@ -108,8 +103,7 @@ fn gain<const K: usize>(gram: &Array2<f64>, score: &[f64], chosen: [usize; K]) -
     force.iter().all(|force| *force > 0.0).then(|| dot(&force, &own_score))
 }
 
-/// Gauss–Newton on the places and forces of K contacts from the best forces at `nodes`, with steps halved until the misfit
-/// falls. There are N = 1 + 2K unknowns, the first of which, the force of a surface's first mode, is held.
+/// Gauss–Newton on N = 1 + 2K unknowns; the first one, the force of the first mode, is fixed.
 fn refine<const K: usize, const N: usize>(
     search: &Search,
     whitened: &[f64],
@@ -143,7 +137,7 @@ fn refine<const K: usize, const N: usize>(
     let mut here = fit(contacts);
     let free = std::array::from_fn(|i| i > 0);
     for _ in 0..MOST_STEPS {
-        // Damped, where places and forces cannot be distinguished.
+        // Damping for nearly collinear places and forces.
         let mut damped = here.information;
         (0..N).for_each(|i| damped[i][i] *= 1.0 + 1e-9);
         let step = Ldl::of_free(&damped, free)?.solve(here.score);
@@ -188,9 +182,9 @@ fn refine<const K: usize, const N: usize>(
     Some(MultiContact { contacts, misfit: here.misfit })
 }
 
-/// Fit of contacts to a whitened reading, by a whitened table. `scale` is what multiplies v for a contact, and `mode`
-/// is u with each sensor's g. Of the K = 1 + 2C unknowns the first is u, which is told by nothing without `mode`; place and
-/// force of each contact follow.
+/// Fit of contacts: `scale` multiplies v, and `mode` is u with g of each sensor.
+///
+/// Unknowns are u, then place and force of each contact.
 #[inline]
 pub(super) fn contact_fit<const C: usize, const K: usize>(
     table: &InfluenceTable,
@@ -227,7 +221,6 @@ pub(super) fn contact_fit<const C: usize, const K: usize>(
     fit.mirrored()
 }
 
-/// The first mode's shape at a place, and its slope per metre.
 pub(super) fn first_mode(length_m: f64, x_m: f64) -> [f64; 2] {
     let wave = PI / length_m;
     let (sin, cos) = (wave * x_m).sin_cos();

@@ -1,4 +1,4 @@
-//! The estimate of one contact from the minima of its misfit: position, force, 95 % interval, status, and the other places.
+//! Estimate of one contact from the local minima of χ².
 
 use super::coarse::{COARSE, MOST_MINIMA, Profile};
 use super::gauss_newton::Minimum;
@@ -10,17 +10,15 @@ use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_numerics::{bisect, normal_cdf, normal_interval_95};
 
-/// A minimum with a wider standard deviation, in spacings of the nodes, is no parabola.
+/// Standard deviation, in node spacings, above which a minimum is not a parabola.
 const MOST_SPACINGS: f64 = 1.5;
 
-/// A whitened reading, in groups of eight channels, and its squared length.
 #[derive(Clone, Copy)]
 pub(super) struct Read<'a> {
     pub whitened: &'a [[f64; 8]],
     pub square: f64,
 }
 
-/// Writes the estimate from the minima of a reading.
 #[inline(always)]
 pub(super) fn conclude(
     search: &Search,
@@ -57,14 +55,13 @@ pub(super) fn conclude(
     }
 }
 
-/// True for a minimum whose force is not known, and more than the greatest less four standard deviations.
+/// True within four standard deviations of the greatest force.
 #[inline(always)]
 fn is_too_hard(search: &Search, minimum: &Minimum) -> bool {
     let left_n = search.greatest_force_n - minimum.force_n;
     search.force == ForceBelief::Unknown && !(left_n > 0.0 && left_n * left_n > 16.0 * minimum.covariance[2])
 }
 
-/// Writes the estimate of a reading that one normal distribution does not describe.
 #[cold]
 fn write_uncertain(
     search: &Search,
@@ -94,7 +91,6 @@ fn write_uncertain(
     }
 }
 
-/// The contacts that a reading does not exclude.
 fn not_excluded(search: &Search, whitened: &[[f64; 8]], minima: &[Minimum]) -> Option<NotExcluded> {
     let (table, gauss_newton) = (&search.table, &search.gauss_newton);
     let channels = |x_m: f64, force_n: f64, channels: &mut Vec<[f64; 2]>| {
@@ -126,7 +122,6 @@ fn not_excluded(search: &Search, whitened: &[[f64; 8]], minima: &[Minimum]) -> O
     contacts.not_excluded(&minima_m)
 }
 
-/// Writes the estimate from minima that compete, or one that is wide or near an end.
 fn write_competing(search: &Search, minima: &[Minimum], misfits: &[f64; COARSE], estimate: &mut Estimate) {
     let shares = shares(minima, search.table.length_m);
     let x_95_m = interval(search, minima, &shares, misfits);
@@ -145,7 +140,7 @@ fn write_competing(search: &Search, minima: &[Minimum], misfits: &[f64; COARSE],
 #[inline(always)]
 fn contact(search: &Search, minimum: &Minimum, x_95_m: (f64, f64)) -> ContactEstimate {
     let [xx, xf, ff] = minimum.covariance;
-    // On a line of length l nothing is known less than of a uniform distribution.
+    // Variance of a uniform distribution over the line.
     let most = search.table.length_m.powi(2) / 12.0;
     let uncertainty = Uncertainty::on_line([xx.min(most), xf, ff], x_95_m);
     ContactEstimate {
@@ -155,7 +150,7 @@ fn contact(search: &Search, minimum: &Minimum, x_95_m: (f64, f64)) -> ContactEst
     }
 }
 
-/// Each minimum's share of the probability, by Laplace's approximation within the surface's ends.
+/// Probabilities by Laplace's approximation within the ends.
 fn shares(minima: &[Minimum], length_m: f64) -> [f64; MOST_MINIMA] {
     let mut shares = [0.0; MOST_MINIMA];
     if minima.len() == 1 {
@@ -171,12 +166,10 @@ fn shares(minima: &[Minimum], length_m: f64) -> [f64; MOST_MINIMA] {
     shares.map(|share| share / sum)
 }
 
-/// Share of a normal distribution that lies on the surface.
 fn mass(mean_m: f64, sd_m: f64, length_m: f64) -> f64 {
     normal_cdf((length_m - mean_m) / sd_m) - normal_cdf(-mean_m / sd_m)
 }
 
-/// The 95 % interval of the position over all minima.
 fn interval(search: &Search, minima: &[Minimum], shares: &[f64], misfits: &[f64; COARSE]) -> (f64, f64) {
     let length_m = search.table.length_m;
     let wide =
@@ -199,7 +192,7 @@ fn interval(search: &Search, minima: &[Minimum], shares: &[f64], misfits: &[f64;
     (quantile(0.025), quantile(0.975))
 }
 
-/// The 95 % interval of one minimum, held to the surface.
+/// 95 % interval, truncated to the line.
 fn single_interval(minimum: &Minimum, length_m: f64) -> (f64, f64) {
     let sd_m = minimum.covariance[0].sqrt();
     let (left, right) = (minimum.x_m / sd_m, (length_m - minimum.x_m) / sd_m);
@@ -212,10 +205,9 @@ fn single_interval(minimum: &Minimum, length_m: f64) -> (f64, f64) {
     (quantile(0.025), quantile(0.975))
 }
 
-/// The 95 % interval where the misfit is far from a parabola: by the trapezoidal rule over the nodes, with a prior that
-/// is flat in the position and in the size of the signal.
+/// 95 % interval by the trapezoidal rule, with a prior flat in the position and in the size of the signal.
 fn interval_of_profile(misfits: &[f64; COARSE], length_m: f64) -> (f64, f64) {
-    /// A density of less than e⁻⁵⁰ of the highest adds nothing.
+    /// Rise of χ² to a negligible density, e⁻⁵⁰ of the highest.
     const NOTHING_THERE: f64 = 100.0;
     let best = misfits.iter().copied().fold(f64::INFINITY, f64::min);
     let density = |misfit: f64| {

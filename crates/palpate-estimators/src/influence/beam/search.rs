@@ -1,14 +1,7 @@
-//! Where one contact is: whitened search over the table, then Gauss–Newton.
+//! Search for one contact on a line: whitening, coarse search, Gauss–Newton.
 //!
-//! Symbols: d whitened reading (less offsets, over the noise), f whitened influence, W force, a position,
-//! χ²(a, W) = |d − W·f(a)|² (+ the force's own misfit where it is believed to be near a value), S channels in use.
-//!
-//! What it costs: the scan takes S·40 multiply-adds, eight side by side, and reads S·40 influences; a step reads two nodes
-//! of the table and one of the weights. Neither bounds a single reading, whose steps wait for each other: sums, valleys, a
-//! place, sums, a division, the next place, a root. So the search saves links of that chain: the force starts from the
-//! scan's products and is solved for with the place's own sums, nearly always one or two steps are enough ([`super::gauss_newton`]
-//! knows when), and valleys that cannot compete are not refined where the force is known. Batches run eight chains side
-//! by side ([`super::locator`]).
+//! Symbols: d whitened reading (minus offsets, over the noise), f whitened influence, W force, a position,
+//! χ²(a, W) = |d − W·f(a)|² (+ the term of a normal prior of the force).
 
 use super::coarse::{Coarse, MOST_MINIMA, Profile};
 use super::gauss_newton::{GaussNewton, Minimum, grouped, paired};
@@ -19,35 +12,27 @@ use crate::influence::config::ForceBelief;
 use crate::status::{LINE_PLACES, StatusRule, unknowns};
 use palpate_numerics::simd::Eight;
 
-/// A table that is ready to be searched: whitened, and without the channels that are left out.
+/// Whitened table of the channels in use.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Search {
-    /// The channels in use.
     pub live: Vec<usize>,
-    /// Whether those are the first channels of a reading.
     from_first: bool,
-    /// Offset and one over the noise of the channels in use, in groups of eight, padded with zeros.
+    /// Offset and 1/noise, in zero-padded groups of eight channels.
     scaling: Vec<[[f64; 8]; 2]>,
-    /// f, f′ and the variance of f, of the channels in use.
     pub table: InfluenceTable,
     pub coarse: Coarse,
     pub gauss_newton: GaussNewton,
     pub force: ForceBelief,
-    /// Greatest force of a contact of unknown force, in newtons.
     pub greatest_force_n: f64,
-    /// The rule for one contact.
     pub rule: StatusRule,
-    /// Directions of a spread.
     spread: SpreadTable,
 }
 
-/// A minimum this much above the best has a share of e⁻¹² of the probability.
+/// A minimum this far above the best has e⁻¹² of its probability.
 pub(super) const NEGLIGIBLE: f64 = 24.0;
-/// Steps to a minimum, of which one or two are the rule.
 const MOST_STEPS: usize = 32;
 
 impl Search {
-    /// Whitens a table by the noise of each channel, and leaves out the channels that are `dead`.
     pub fn new(table: &InfluenceTable, channels: &Channels, force: ForceBelief) -> Self {
         let Channels { offsets, noise_sd, reference_force_n, false_alarm_rate, .. } = channels;
         let live = channels.live();
@@ -69,13 +54,12 @@ impl Search {
         }
     }
 
-    /// Groups of eight channels.
     #[inline(always)]
     pub fn groups(&self) -> usize {
         self.scaling.len()
     }
 
-    /// Writes d, in groups of eight channels, and returns |d|².
+    /// Writes d and returns |d|².
     #[inline(always)]
     pub fn whiten<V: Eight>(&self, reading: &[f64], whitened: &mut [[f64; 8]]) -> f64 {
         let mut square = V::splat(0.0);
@@ -96,8 +80,7 @@ impl Search {
         square.sum()
     }
 
-    /// The lowest valley of a reading that was whitened to length `square`, and below which misfit no other valley goes;
-    /// `None` where there is no valley.
+    /// Lowest local minimum, and a lower bound of χ² of the others.
     #[inline(always)]
     pub fn lowest_valley<V: Eight>(
         &self,
@@ -112,20 +95,19 @@ impl Search {
         Some((*lowest, floor.fold(f64::INFINITY, f64::min)))
     }
 
-    /// True where a point explains a reading by its minimum: neither its misfit nor its spread is more than noise makes it.
     #[inline(always)]
     pub fn is_explained(&self, whitened: &[[f64; 8]], minimum: &Minimum) -> bool {
         self.rule.is_explained(minimum.misfit) && !self.is_spread(whitened, minimum)
     }
 
-    /// True for a reading that is, by its minimum, one of a contact that is spread.
+    /// Distributed-contact test.
     #[inline(always)]
     pub fn is_spread(&self, whitened: &[[f64; 8]], minimum: &Minimum) -> bool {
-        // The square of the residual is at least that of its part.
+        // χ² is at least as large as the score.
         minimum.misfit > self.spread.bound && self.spread.is_told(&self.gauss_newton, whitened, minimum)
     }
 
-    /// The minima that matter, best first, of a reading that was whitened to length `square`.
+    /// Relevant minima, best first; `square` is |d|².
     #[inline(always)]
     pub fn minima<V: Eight>(&self, square: f64, scratch: &mut Scratch) -> ([Minimum; MOST_MINIMA], usize) {
         let whitened = scratch.whitened.groups(self.groups());
@@ -155,7 +137,6 @@ impl Search {
     }
 }
 
-/// The readings of some channels.
 #[inline(always)]
 fn gather(reading: &[f64], channels: &[usize]) -> [f64; 8] {
     let mut raw = [0.0; 8];
@@ -163,7 +144,7 @@ fn gather(reading: &[f64], channels: &[usize]) -> [f64; 8] {
     raw
 }
 
-/// Memory for locating readings, to be used again; up to sixteen channels it lies in place, without allocation.
+/// Reusable memory for locating readings; up to sixteen channels need no allocation.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     pub(super) whitened: Whitened,
@@ -171,7 +152,6 @@ pub struct Scratch {
     pub(super) eight: ForEight,
 }
 
-/// The same for eight readings, one after the other; empty until there is a batch.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ForEight {
     pub whitened: Vec<[f64; 8]>,
@@ -179,7 +159,6 @@ pub(super) struct ForEight {
 }
 
 impl ForEight {
-    /// Room for so many groups of channels in each reading.
     #[inline(always)]
     pub fn resize(&mut self, groups: usize) {
         self.whitened.resize(8 * groups, [0.0; 8]);
@@ -187,7 +166,7 @@ impl ForEight {
     }
 }
 
-/// d, in groups of eight channels, padded with zeros.
+/// d, in zero-padded groups of eight channels.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Whitened {
     near: [[f64; 8]; 2],
@@ -195,7 +174,6 @@ pub(super) struct Whitened {
 }
 
 impl Whitened {
-    /// Room for so many groups.
     #[inline(always)]
     pub fn room(&mut self, groups: usize) -> &mut [[f64; 8]] {
         if groups <= 2 {
@@ -205,13 +183,11 @@ impl Whitened {
         &mut self.far
     }
 
-    /// So many groups.
     #[inline(always)]
     pub fn groups(&self, groups: usize) -> &[[f64; 8]] {
         if groups <= 2 { &self.near[..groups] } else { &self.far[..groups] }
     }
 
-    /// d of so many channels.
     pub fn channels(&self, channels: usize) -> &[f64] {
         &self.groups(channels.div_ceil(8)).as_flattened()[..channels]
     }

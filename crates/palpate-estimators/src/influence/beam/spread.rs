@@ -1,4 +1,4 @@
-//! Directions of a spread about every place of a line, ready for the residuals of readings; see [`crate::spread`].
+//! Directions of the distributed-contact test about every place of a line; see [`crate::spread`].
 
 use super::gauss_newton::{GaussNewton, Minimum, grouped, interpolate};
 use super::table::InfluenceTable;
@@ -6,22 +6,19 @@ use crate::influence::config::ForceBelief;
 use crate::spread::{About, SpreadDirections, spread_bound};
 use palpate_numerics::simd::{Arithmetic, Array, Eight, Vector};
 
-/// A group of eight channels: a reading is looked at by one minimum or two, which is no work worth a set of instructions.
 type Group = Array<f64, 8, false>;
 
-/// The direction of a spread in every cell of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct SpreadTable {
-    /// u·√w in groups of eight channels: u the direction, w the weights of the cell. 0 where there is none.
+    /// u·√w: u the direction, w the weights of the cell; 0 without a direction.
     units: Vec<[f64; 8]>,
-    /// Σ u²·(1 − w): the part of the variance along u that the calibration has, which grows with the force.
+    /// Σ u²·(1 − w): the calibration's part of the variance along u.
     calibrated: Vec<f64>,
-    /// The score from which on a contact is spread.
+    /// Critical value of the score.
     pub bound: f64,
 }
 
 impl SpreadTable {
-    /// Over a whitened table.
     pub fn new(table: &InfluenceTable, gauss_newton: &GaussNewton, force: ForceBelief) -> Self {
         let (mut units, mut calibrated) = (Vec::new(), Vec::new());
         let force_ends = force.known_n().map_or((0.0, f64::INFINITY), |_| (1.0, 1.0));
@@ -44,7 +41,6 @@ impl SpreadTable {
         Self { units, calibrated, bound: spread_bound(1) }
     }
 
-    /// True where the residual of a minimum is that of a contact that is spread.
     #[inline]
     pub fn is_told(&self, gauss_newton: &GaussNewton, whitened: &[[f64; 8]], minimum: &Minimum) -> bool {
         let (cell, groups) = (gauss_newton.spacing.cell(minimum.x_m), gauss_newton.groups);

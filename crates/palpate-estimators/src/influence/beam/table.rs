@@ -1,52 +1,45 @@
-//! Influence functions along a line as a table: values and slopes at evenly spaced nodes, cubic between them.
+//! Table of influence functions along a line, with cubic Hermite interpolation.
 
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::InfluenceFunction;
 use palpate_numerics::simd::Number;
 use serde::{Deserialize, Serialize};
 
-/// Reading of every sensor per newton, with its uncertainty, as a function of the contact's position along the surface.
-///
-/// Between nodes the functions are cubic Hermite polynomials. Numbers are stored node by node, and within a node
-/// sensor by sensor, so that all sensors of a place lie side by side.
+/// Influence functions of all sensors at evenly spaced nodes, stored by node, then by sensor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InfluenceTable {
-    /// Sensors S.
+    /// Number of sensors S.
     pub sensors: usize,
-    /// Length of the surface in metres; nodes are at i·length/(nodes − 1).
+    /// Length of the line in metres; node i is at i·length/(nodes − 1).
     pub length_m: f64,
-    /// Reading per newton, in the sensors' SI units or raw, nodes × S.
+    /// Reading per newton, SI or raw, nodes × S.
     pub values: Vec<f64>,
-    /// Derivative of the values along the surface, per metre, nodes × S.
+    /// Derivative of the values per metre, nodes × S.
     pub slopes: Vec<f64>,
-    /// Variance of the values, from calibrating with finitely many noisy presses, nodes × S.
+    /// Posterior variance of the values, nodes × S.
     pub variances: Vec<f64>,
 }
 
-/// A place between two nodes, or several side by side.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cell<N> {
-    /// The node to the left.
+    /// Left node.
     pub node: N,
-    /// Weights of left value, right value, left slope, right slope in the function.
+    /// Weights of left value, right value, left slope, right slope.
     pub value: [N; 4],
-    /// The same for the function's derivative.
+    /// Weights of the derivative.
     pub slope: [N; 4],
 }
 
-/// Evenly spaced nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Spacing {
-    /// Distance between nodes, in metres.
     pub h_m: f64,
     inverse_h: f64,
-    /// The last node.
     last: usize,
 }
 
 impl Spacing {
-    /// The cell that holds `x_m`, which is held to the surface.
+    /// Cell of `x_m`, clamped to the line.
     #[inline(always)]
     pub fn cell<N: Number>(&self, x_m: N) -> Cell<N> {
         let n = N::splat;
@@ -66,13 +59,11 @@ impl Spacing {
 }
 
 impl InfluenceTable {
-    /// A table of zeros.
     pub(super) fn empty(sensors: usize, length_m: f64) -> Self {
         let zeros = vec![0.0; sensors * Self::NODES];
         Self { sensors, length_m, values: zeros.clone(), slopes: zeros.clone(), variances: zeros }
     }
 
-    /// The channels `live` of it, multiplied by `inverse_sd`, one over the noise of each.
     pub(super) fn whitened(&self, live: &[usize], inverse_sd: &[f64]) -> Self {
         let whiten = |values: &[f64], power: i32| {
             let rows = values.chunks_exact(self.sensors);
@@ -90,41 +81,38 @@ impl InfluenceTable {
         }
     }
 
-    /// Nodes of a table: eight sensors' influence functions are then interpolated to 10⁻⁷ of full scale.
+    /// Nodes of a table; they interpolate eight sensors to 10⁻⁷ of full scale.
     pub const NODES: usize = 129;
 
-    /// Number of nodes.
+    /// Returns the number of nodes.
     pub fn nodes(&self) -> usize {
         self.values.len() / self.sensors.max(1)
     }
 
-    /// Distance between nodes, in metres.
+    /// Returns the distance between nodes, in metres.
     pub fn spacing_m(&self) -> f64 {
         self.length_m / (self.nodes() - 1) as f64
     }
 
-    /// Position of a node, in metres.
+    /// Returns the position of a node, in metres.
     pub fn node_m(&self, node: usize) -> f64 {
         node as f64 * self.spacing_m()
     }
 
-    /// The values of all sensors at a node.
+    /// Returns the values of all sensors at a node.
     pub fn at_node(&self, node: usize) -> &[f64] {
         &self.values[node * self.sensors..(node + 1) * self.sensors]
     }
 
-    /// Spacing of the nodes.
     pub(super) fn spacing(&self) -> Spacing {
         let h_m = self.spacing_m();
         Spacing { h_m, inverse_h: 1.0 / h_m, last: self.nodes() - 1 }
     }
 
-    /// The cell that holds `x_m`, which is held to the surface.
     pub(super) fn cell(&self, x_m: f64) -> Cell<f64> {
         self.spacing().cell(x_m)
     }
 
-    /// Calls `each` with sensor, value and slope, for every sensor at a place.
     #[inline]
     pub(super) fn for_each(&self, cell: Cell<f64>, mut each: impl FnMut(usize, f64, f64)) {
         let s = self.sensors;
@@ -138,7 +126,6 @@ impl InfluenceTable {
         }
     }
 
-    /// Value and slope of one sensor at a place.
     #[inline]
     pub(super) fn value_and_slope(&self, cell: &Cell<f64>, sensor: usize) -> (f64, f64) {
         let left = cell.node as usize * self.sensors + sensor;
@@ -148,7 +135,6 @@ impl InfluenceTable {
         (mix(&cell.value), mix(&cell.slope))
     }
 
-    /// The variances of all sensors at the node nearest to a place.
     #[inline]
     pub(super) fn variances_near(&self, x_m: f64) -> &[f64] {
         let node = ((x_m / self.spacing_m()).round().max(0.0) as usize).min(self.nodes() - 1);
@@ -156,7 +142,7 @@ impl InfluenceTable {
     }
 }
 
-/// The influence function of one sensor of a table.
+/// Influence function of one sensor of a table.
 #[derive(Clone, Copy, Debug)]
 pub struct FittedInfluence<'a> {
     table: &'a InfluenceTable,
@@ -164,7 +150,7 @@ pub struct FittedInfluence<'a> {
 }
 
 impl InfluenceTable {
-    /// The influence function of a sensor, from 0; 0 everywhere for one that the table does not have.
+    /// Returns the influence function of a sensor, from 0; 0 for a missing index.
     pub fn function(&self, sensor: usize) -> FittedInfluence<'_> {
         FittedInfluence { table: self, sensor }
     }

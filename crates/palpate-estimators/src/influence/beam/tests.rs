@@ -35,12 +35,11 @@ fn clean(setup: &Setup, contacts: &[(f64, f64)]) -> Vec<f64> {
     sum
 }
 
-/// Readings with the bench's noise.
 fn noisy(setup: &Setup, contacts: &[(f64, f64)], rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
     measure(setup.layout(), &clean(setup, contacts), &ChannelErrors::none(setup.layout()), rng)
 }
 
-/// σ_limit of the position for 3 N at `x_m`, by finite differences: the Cramér–Rao bound without the module that has it.
+/// Cramér–Rao standard deviation of the position for 3 N at `x_m`, by finite differences.
 fn limit_m(setup: &Setup, x_m: f64, force_known: bool) -> f64 {
     let (h, force_n) = (1e-7, 3.0);
     let (right, left) = (clean(setup, &[(x_m + h, force_n)]), clean(setup, &[(x_m - h, force_n)]));
@@ -76,15 +75,14 @@ fn clean_presses_locate_to_a_thousandth_of_a_percent() {
     }
 }
 
-/// What is wrong with the sensors, unknown to the locator but for the dead one.
+/// Faults of the sensors, unknown to the locator except the disabled channel.
 #[derive(Clone, Copy, Debug, Default)]
 struct Faults {
-    /// Those of every channel.
     channel: Option<ChannelModel>,
     dead: Option<usize>,
 }
 
-/// Mean error over the limit's mean error, and the share of intervals that hold the truth, over 5–395 mm.
+/// Mean error relative to the limit, and coverage of the intervals, over 5–395 mm.
 fn ratio_and_coverage(source: InfluenceSource, force_known: bool, faults: Faults) -> (f64, f64) {
     let (mut error_m, mut limit, mut covered, mut count) = (0.0, 0.0, 0, 0);
     for seed in 0..40 {
@@ -229,7 +227,7 @@ fn two_contacts_are_told_apart() {
     assert!(near as f64 >= 0.95 * f64::from(count), "{near} of {count}");
 }
 
-/// Whether both positions are within 3 × their limits, those of two places and two unknown forces at once.
+/// True where both positions are within 3 limits for two places and two unknown forces.
 fn both_near(setup: &Setup, truth: [(f64, f64); 2], found: [ContactEstimate; 2]) -> bool {
     let noise = setup.layout().sensors()[0].channel.noise_sd;
     let columns: Vec<Vec<f64>> = (0..4)

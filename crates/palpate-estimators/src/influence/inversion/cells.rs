@@ -1,57 +1,49 @@
-//! Cells of a grid, and how a reading looks from their middles, eight cells side by side.
+//! Coarse search over the cells of a grid.
 
 use crate::influence::lanes::{LANES, Lanes};
 use palpate_numerics::simd::{Eight, InstructionSet, Kernel, Simd, Vector};
 
-/// Nodes of a grid in cells of the same size, each around its middle node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::influence) struct Cells {
-    /// Nodes along and across.
     nodes: [usize; 2],
-    /// Nodes of a cell along either; odd.
+    /// Nodes per cell; odd.
     stride: [usize; 2],
 }
 
-/// A cell as a reading sees it from its middle.
+/// Candidate of the coarse search.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::influence) struct Look {
-    /// Least squared residual, in variances, about.
+    /// Approximate χ² at the best amplitude.
     pub misfit: f64,
-    /// The same with what else the middle costs.
+    /// χ² plus the other terms of −2·ln of the posterior density.
     pub cost: f64,
-    /// The latent number there.
     pub latent: f64,
 }
 
 impl Cells {
-    /// Of a grid of so many nodes, `stride` of them to a cell along every axis that varies.
     pub fn new(nodes: [usize; 2], stride: usize) -> Self {
         Self { nodes, stride: nodes.map(|nodes| if nodes > 1 { stride } else { 1 }) }
     }
 
-    /// Cells along and across.
     fn counts(self) -> [usize; 2] {
         [0, 1].map(|k| self.nodes[k].div_ceil(self.stride[k]))
     }
 
-    /// Number of cells.
     pub fn len(self) -> usize {
         self.counts().iter().product()
     }
 
-    /// Number of a cell along and across.
     fn indices(self, cell: usize) -> [usize; 2] {
         let across = self.counts()[1];
         [cell / across, cell % across]
     }
 
-    /// The node in the middle of a cell, along and across.
     pub fn middle(self, cell: usize) -> [usize; 2] {
         let at = self.indices(cell);
         [0, 1].map(|k| (at[k] * self.stride[k] + self.stride[k] / 2).min(self.nodes[k] - 1))
     }
 
-    /// The part of the grid that is nearer to a cell than to others.
+    /// Ends of a cell, in nodes.
     pub(super) fn span(self, cell: usize) -> [(f64, f64); 2] {
         let at = self.indices(cell);
         [0, 1].map(|k| {
@@ -60,7 +52,7 @@ impl Cells {
         })
     }
 
-    /// The cells that are no dearer than those around them, the cheapest first.
+    /// Local minima in order of cost.
     pub(super) fn valleys(self, looks: &[Look], most: usize) -> Vec<usize> {
         let counts @ [rows, columns] = self.counts();
         let cells = (0..rows).flat_map(|i| (0..columns).map(move |j| [i, j]));
@@ -72,12 +64,12 @@ impl Cells {
     }
 }
 
-/// True of a cell of a grid of so many that is cheaper than those around it before it, and no dearer than those behind it.
+/// Of equal cells, only the first is a minimum.
 fn is_valley(looks: &[Look], [rows, columns]: [usize; 2], [i, j]: [usize; 2]) -> bool {
     let around = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
     let cell = i * columns + j;
     let cost = looks[cell].cost;
-    // Two of its neighbours tell most cells.
+    // Two neighbours exclude most cells.
     let is_before = i > 0 && looks[cell - columns].cost <= cost;
     let is_behind = i + 1 < rows && looks[cell + columns].cost < cost;
     !is_before
@@ -92,16 +84,13 @@ fn is_valley(looks: &[Look], [rows, columns]: [usize; 2], [i, j]: [usize; 2]) ->
         })
 }
 
-/// Numbers of the middles of cells, in blocks of eight, by which a reading looks at them.
 pub(in crate::influence) trait CellBlocks {
-    /// Number of cells.
     fn cells(&self) -> usize;
 
-    /// The misfit, the cost and the latent number of each cell of a block, for the channels of a reading.
+    /// χ², cost and amplitude of each cell of a block.
     fn look<V: Eight>(&self, block: usize, reading: &[f64]) -> [V; 3];
 }
 
-/// Looks at every cell; `reading` is that of so many `channels`.
 pub(in crate::influence) fn look_at_cells(
     blocks: &impl CellBlocks,
     reading: &[Lanes],

@@ -1,28 +1,23 @@
-//! Numbers of every channel at the nodes of a grid, in layers, and between the nodes.
+//! Tables of per-channel values at the nodes of a grid, with cubic interpolation.
 
 use crate::influence::grid::Axis;
 use crate::influence::lanes::{LANES, Lanes};
 use palpate_numerics::simd::{Arithmetic, InstructionSet, Kernel, Simd, Vector};
 use std::ops::Range;
 
-/// Layers of numbers, one a channel, over the places of a grid.
-///
-/// Eight channels stand side by side in a group, the groups of a layer one after the other, the layers of a place too; the last group is filled
-/// up with zeros.
+/// Layers of values over a grid, by node, layer and group of eight channels; zeros pad the last group.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(in crate::influence) struct Layers {
-    /// Places along and across.
     counts: [usize; 2],
     layers: usize,
     groups: usize,
     values: Vec<Lanes>,
 }
 
-/// A value and its change by a node along and across, of eight channels.
+/// Value and derivatives per node along and across, of eight channels.
 pub(in crate::influence) type Slopes = [Lanes; 3];
 
 impl Layers {
-    /// `layers` of `channels` numbers, told by `at` a place, a layer and a channel.
     pub fn new(
         axes: [Axis; 2],
         layers: usize,
@@ -41,25 +36,22 @@ impl Layers {
         Self { counts, layers, groups, values }
     }
 
-    /// Groups of eight channels.
     pub fn groups(&self) -> usize {
         self.groups
     }
 
-    /// The groups of some layers of a place.
     pub fn groups_of(&self, place: usize, layers: Range<usize>) -> &[Lanes] {
         let first = place * self.layers;
         &self.values[(first + layers.start) * self.groups..(first + layers.end) * self.groups]
     }
 
-    /// Some layers at (x, y), in nodes, by cubic interpolation through four places each way, into `out`.
+    /// Interpolates layers at (x, y), in nodes, through four nodes per axis.
     pub fn interpolate(&self, at: [f64; 2], layers: Range<usize>, out: &mut Vec<Lanes>) {
         out.clear();
         out.resize(layers.len() * self.groups, [0.0; LANES]);
         self.interpolate_by(at, layers, out.as_chunks_mut().0, |[x, y], i, j| [x.weights[i] * y.weights[j]]);
     }
 
-    /// The same with slopes.
     pub fn interpolate_slopes(&self, at: [f64; 2], layers: Range<usize>, out: &mut Vec<Slopes>) {
         out.clear();
         out.resize(layers.len() * self.groups, [[0.0; LANES]; 3]);
@@ -68,7 +60,6 @@ impl Layers {
         });
     }
 
-    /// Sums of K weights each.
     fn interpolate_by<const K: usize>(
         &self,
         [x, y]: [f64; 2],
@@ -81,7 +72,7 @@ impl Layers {
     }
 }
 
-/// Lagrange's weights of up to four nodes around a place, and their change by a node.
+/// Lagrange weights of up to four nodes, and their derivatives per node.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::influence) struct Stencil {
     pub first: usize,
@@ -91,7 +82,6 @@ pub(in crate::influence) struct Stencil {
 }
 
 impl Stencil {
-    /// Around a place of a row of `count` nodes.
     #[inline]
     pub fn new(place: f64, count: usize) -> Self {
         let used = count.min(4);
@@ -125,7 +115,6 @@ struct Interpolate<'a, W, const K: usize> {
     table: &'a Layers,
     stencils: [Stencil; 2],
     layers: Range<usize>,
-    /// Weights of node (i, j) of the stencils.
     weights: W,
     out: &'a mut [[Lanes; K]],
 }
@@ -138,7 +127,6 @@ impl<W: Fn(&[Stencil; 2], usize, usize) -> [f64; K], const K: usize> Kernel for 
     fn run<S: Simd>(self) {
         let Self { table, stencils, layers, weights, out } = self;
         let [along, across] = &stencils;
-        // Weights of the nodes, and where in the table their first group is.
         let mut nodes = [([0.0; K], 0); 16];
         for i in 0..along.used {
             for j in 0..across.used {
@@ -174,7 +162,7 @@ mod tests {
         Layers::new(counts.map(axis), 2, 9, of)
     }
 
-    /// As high a degree each way as so many nodes tell, up to the third.
+    /// Highest degree per axis that the nodes determine, at most cubic.
     fn polynomial([x, y]: [f64; 2], counts: [usize; 2]) -> f64 {
         let power = |at: f64, count: usize| (0.3 * at + 0.1).powi(count.min(4) as i32 - 1);
         power(x, counts[0]) * power(y, counts[1])

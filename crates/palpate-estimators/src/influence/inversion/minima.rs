@@ -1,11 +1,10 @@
-//! Minima of a reading's misfit, and the modes that they belong to.
+//! Local minima of a reading's cost, and their modes.
 
 use super::cells::Look;
 use super::{Explain, Explained};
 use crate::influence::levenberg::{Unknowns, descend};
 use palpate_numerics::small::Matrix;
 
-/// A minimum of the misfit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Minimum {
     pub at: Unknowns,
@@ -13,14 +12,14 @@ pub(super) struct Minimum {
     pub information: Matrix<3>,
 }
 
-/// A minimum this much above the best has a share of e⁻¹² of the probability.
+/// A minimum this far above the best has e⁻¹² of its probability.
 const NEGLIGIBLE: f64 = 24.0;
-/// Valleys that may matter; more hardly ever compete.
+/// More minima rarely compete.
 const MOST_VALLEYS: usize = 8;
-/// A step that lowers the misfit by less than this, a thirtieth of a standard deviation, is the last one.
+/// Least decrease of χ² per step: a thirtieth of a standard deviation, squared.
 const SMALL: f64 = 1e-3;
 
-/// The minima that matter, best first; none where no cell explains the reading at all.
+/// Returns the relevant minima, best first.
 pub(super) fn minima<E: Explain>(reading: &mut E, looks: &[Look]) -> Vec<Minimum> {
     let cells = reading.cells();
     let mut found: Vec<Minimum> = Vec::with_capacity(MOST_VALLEYS);
@@ -47,7 +46,7 @@ pub(super) fn minima<E: Explain>(reading: &mut E, looks: &[Look]) -> Vec<Minimum
     found
 }
 
-/// Lower bound of what places of a cell cost, about: its corners are half the way to the next cells from its middle.
+/// Approximate lower bound of the cost within a cell.
 pub(super) fn least_cost<E: Explain>(reading: &E, cell: usize, look: &Look) -> f64 {
     let cells = reading.cells();
     let [along, across] = reading.lengths(cells.middle(cell), look.latent);
@@ -57,7 +56,7 @@ pub(super) fn least_cost<E: Explain>(reading: &E, cell: usize, look: &Look) -> f
     closest * closest + (look.cost - look.misfit)
 }
 
-/// True of minima in one valley: on the straight way between them the cost hardly rises.
+/// True of one local minimum: on the line between both the cost rises by at most 1.
 fn same<E: Explain>(reading: &mut E, a: &Minimum, b: &Minimum) -> bool {
     const RISE: f64 = 1.0;
     const CLOSE: f64 = 0.05;
@@ -65,7 +64,8 @@ fn same<E: Explain>(reading: &mut E, a: &Minimum, b: &Minimum) -> bool {
     close || highest_between(reading, a, b) <= a.found.cost.max(b.found.cost) + RISE
 }
 
-/// Number of the mode of each minimum, from 0: minima between which the density does not fall to a hundredth of the best one's are one mode.
+/// Returns the mode of each minimum; within a mode the density between minima stays above a hundredth of the
+/// best.
 pub(super) fn modes<E: Explain>(reading: &mut E, minima: &[Minimum]) -> Vec<usize> {
     const VALLEY: f64 = 0.01;
     let rise = -2.0 * VALLEY.ln();
@@ -80,7 +80,6 @@ pub(super) fn modes<E: Explain>(reading: &mut E, minima: &[Minimum]) -> Vec<usiz
     modes
 }
 
-/// The highest cost on the straight way between two minima.
 fn highest_between<E: Explain>(reading: &mut E, a: &Minimum, b: &Minimum) -> f64 {
     const STEPS: usize = 8;
     let costs = (1..STEPS).map(|step| {
@@ -91,7 +90,6 @@ fn highest_between<E: Explain>(reading: &mut E, a: &Minimum, b: &Minimum) -> f64
     costs.fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// The minimum near a contact.
 fn refined<E: Explain>(reading: &mut E, start: Unknowns) -> Minimum {
     let [x, y] = reading.axes().map(|axis| (0.0, (axis.count - 1) as f64));
     let ends = [x, y, reading.range().unwrap_or((start[2], start[2]))];
@@ -99,7 +97,7 @@ fn refined<E: Explain>(reading: &mut E, start: Unknowns) -> Minimum {
         reading.weigh(start);
         descend(start, ends, SMALL, |at| reading.equations(at))
     };
-    // Within one descent the variances stay, so that misfits can be compared.
+    // Constant variances within one descent make χ² comparable.
     let start = [start[0], start[1], start[2].clamp(ends[2].0, ends[2].1)];
     let (near, _) = descend_from(reading, start);
     let (at, equations) = descend_from(reading, near);

@@ -1,7 +1,7 @@
-//! The posterior of a contact over a grid: moments of position and force, 95 % intervals, modes, and the estimate that they give.
+//! Posterior of a contact over a grid with a flat prior.
 //!
-//! Around a minimum that is alone and nearly normal it is summed by a [rule](super::quadrature) of a few points, any other over
-//! [tiles](super::tiles). The prior is flat over the grid, less likely only in its margins.
+//! [Quadrature](super::quadrature) integrates a single, nearly normal mode, [tiles](super::tiles) all other
+//! posteriors.
 
 use super::cells::Look;
 use super::minima::{Minimum, minima, modes};
@@ -18,24 +18,22 @@ use palpate_numerics::{holding, normal_interval_95};
 /// Source of the force of an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::influence) enum ToldForce {
-    /// The reading tells it.
     Estimated,
-    /// It is known, in newtons.
+    /// In newtons.
     Known(f64),
-    /// Nobody knows it.
+    /// Unidentifiable force.
     Untold,
 }
 
-/// The most that a contact at a point leaves of a reading, in variances.
+/// Critical values for one contact at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::influence) struct Limits {
-    /// Of the square of its residual.
+    /// χ².
     pub misfit: f64,
-    /// Of the score of a spread; infinite where that is not looked for.
+    /// Distributed-contact score; infinite without that test.
     pub spread: f64,
 }
 
-/// A reading with the minima of its misfit.
 #[derive(Debug)]
 pub(in crate::influence) struct Inversion<E> {
     reading: E,
@@ -44,7 +42,6 @@ pub(in crate::influence) struct Inversion<E> {
 }
 
 impl<E: Explain> Inversion<E> {
-    /// Looks for the minima of a reading.
     pub fn new(mut reading: E) -> Self {
         let mut looks = Vec::with_capacity(reading.cells().len());
         reading.scan(&mut looks);
@@ -52,25 +49,22 @@ impl<E: Explain> Inversion<E> {
         Self { reading, looks, minima }
     }
 
-    /// The least squared residual, in variances.
     pub fn misfit(&self) -> f64 {
         self.minima.iter().map(|minimum| minimum.found.misfit).fold(f64::INFINITY, f64::min)
     }
 
-    /// The least score of a spread about a minimum.
     pub fn spread(&mut self) -> f64 {
         let Self { reading, minima, .. } = self;
         minima.iter().map(|minimum| reading.spread(minimum.at)).fold(f64::INFINITY, f64::min)
     }
 
-    /// True where a point explains the reading: neither its misfit nor its spread is beyond its limit.
     fn is_explained(&mut self, limits: Limits) -> bool {
         let misfit = self.misfit();
-        // The square of the residual is at least that of its part.
+        // χ² is at least as large as the score.
         misfit <= limits.misfit && (misfit <= limits.spread || self.spread() <= limits.spread)
     }
 
-    /// The mean of the posterior's most probable mode, and what the posterior leaves open; `outside_model` beyond the limits.
+    /// Returns the most probable mode with the posterior's uncertainty; `outside_model` beyond the limits.
     pub fn estimate(mut self, told: ToldForce, limits: Limits) -> Estimate {
         let axes = self.reading.axes();
         let nowhere = Estimate::of_position(middle(axes), Status::OutsideModel);
@@ -97,7 +91,7 @@ impl<E: Explain> Inversion<E> {
         estimate
     }
 
-    /// The posterior around a minimum that is surely alone and nearly normal; `None` of any other.
+    /// `None` unless one nearly normal mode is certain.
     fn quadrature(&mut self) -> Option<Posterior> {
         let Self { reading, minima, .. } = self;
         let best = minima[0];
@@ -114,7 +108,7 @@ impl<E: Explain> Inversion<E> {
         Some(posterior)
     }
 
-    /// The posterior summed up around every minimum; `None` where it is not a number.
+    /// `None` where the sum is not a positive number.
     fn sum(&mut self) -> Option<Posterior> {
         let Self { reading, looks, minima } = self;
         let axes = reading.axes();
@@ -158,7 +152,7 @@ impl<E: Explain> Inversion<E> {
 
 #[cfg(test)]
 impl<E: Explain> Inversion<E> {
-    /// The contact of a plain sum over the whole grid at so many places a node each way, without bounds: what the search must not change.
+    /// Reference for tests, over the whole grid.
     pub fn summed_everywhere(mut self, told: ToldForce, per_node: usize) -> ContactEstimate {
         let axes = self.reading.axes();
         let count = |axis: Axis| ((axis.count - 1) * per_node).max(1);
@@ -178,20 +172,18 @@ impl<E: Explain> Inversion<E> {
     }
 }
 
-/// Moments of a contact.
 #[derive(Clone, Debug, Default)]
 struct Posterior {
     all: Probable,
-    /// Of what lies nearest to the minima of each mode, the most probable first; only those that are noticeable.
+    /// Most probable first; only modes above the threshold.
     modes: Vec<Probable>,
-    /// 95 % intervals along and across, in metres; `None` where they are those of a normal distribution.
+    /// 95 % intervals in metres; `None` for those of a normal distribution.
     intervals_m: Option<[(f64, f64); 2]>,
 }
 
 impl Posterior {
-    /// The most probable mode, with the uncertainty of all; its intervals hold it.
-    ///
-    /// The mean of all would be of no mode: one of a hundredth as much at the other end of the surface moves it by a hundredth of the length.
+    /// Most probable mode with the overall uncertainty: the mean of a multimodal posterior would lie outside
+    /// all modes.
     fn contact(&self, told: ToldForce) -> ContactEstimate {
         let all = self.all.contact(told);
         let mut contact = self.modes.first().map_or(all, |first| first.contact(told));
@@ -205,22 +197,20 @@ impl Posterior {
     }
 }
 
-/// Position and force of a contact, and the force's variance.
 type ProbableContact = ([f64; 3], f64);
 
-/// Contact at a place.
 fn contact_at<E: Explain>([x, y]: [f64; 2], found: &Explained, reading: &E) -> ProbableContact {
     let [x_axis, y_axis] = reading.axes();
     let (force_n, variance_n2) = reading.force(found.latent, found.latent_variance);
     ([x_axis.value(x), y_axis.value(y), force_n], variance_n2)
 }
 
-/// Some of the probability: everywhere, and without the margins of the grid.
+/// Part of the posterior, with and without the margins.
 ///
-/// An estimate is the mean without the margins, as contacts hardly ever are beyond where presses were made. How sure it is follows from all.
+/// The estimate is the mean without the margins, as contacts there are rare; the covariance includes them.
 #[derive(Clone, Copy, Debug, Default)]
 struct Probable {
-    /// The first contact: sums are taken of what others differ from it, as their squares may be far larger than the variance.
+    /// First contact; sums of differences from it avoid cancellation.
     origin: Option<[f64; 3]>,
     everywhere: Moments,
     usual: Moments,
@@ -236,9 +226,8 @@ impl Probable {
         }
     }
 
-    /// The contact that it describes, its intervals those of a normal distribution.
     fn contact(&self, told: ToldForce) -> ContactEstimate {
-        /// With a smaller share, the reading speaks for a contact in the margins.
+        /// With a smaller share outside the margins, the mean includes them.
         const LEAST_SHARE: f64 = 1e-6;
         let (mean, mut covariance) = self.everywhere.mean_and_covariance();
         let is_usual = self.usual.weight > LEAST_SHARE * self.everywhere.weight;
@@ -265,10 +254,10 @@ impl Probable {
     }
 }
 
-/// Weights that are spread evenly over spans, which may overlap.
+/// Mixture of uniform densities over spans.
 #[derive(Clone, Debug, Default)]
 struct Slices {
-    /// Ends of the spans, with the change of the density there.
+    /// Ends of the spans, with the change of the density.
     ends: Vec<(f64, f64)>,
 }
 
@@ -280,7 +269,6 @@ impl Slices {
         }
     }
 
-    /// The places below which two shares of the weight lie, the lower first.
     fn quantiles(mut self, shares: [f64; 2]) -> [f64; 2] {
         self.ends.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         let last = self.ends.last().map_or(0.0, |end| end.0);

@@ -1,19 +1,17 @@
-//! Gauss and Hermite's rule around a minimum that is alone and nearly normal: 5 points on a line, 3 × 3 on a plane, on the ellipse of the
-//! normal density that is the nearest.
+//! Gauss–Hermite quadrature of a single, nearly normal mode: 5 points on a line, 3 × 3 on a plane.
 
 use super::minima::Minimum;
 use super::{Explain, Explained};
 use crate::influence::grid::Axis;
 use palpate_numerics::small::Ldl;
 
-/// Standard deviations from an edge beyond which the edge does not matter.
+/// Distance from an edge without effect, in standard deviations.
 const CLEAR: f64 = 3.0;
-/// Greatest difference of the cost from a paraboloid, as a share of the paraboloid's rise.
+/// Greatest deviation of the cost from a paraboloid, relative to its rise.
 const MOST_BENT: f64 = 1.0 / 3.0;
-/// Normal densities that are fitted before the posterior counts as too bent.
 const MOST_FITS: usize = 4;
 
-/// Points and weights of Gauss and Hermite's rules for a standard normal density (Abramowitz and Stegun, 25.4.46).
+/// Points and weights for a standard normal density (Abramowitz and Stegun, 25.4.46).
 pub(in crate::influence) const FIVE_POINTS: [(f64, f64); 5] = [
     (0.0, 8.0 / 15.0),
     (1.355_626_179_974_265_8, 0.222_075_922_005_612_64),
@@ -24,7 +22,6 @@ pub(in crate::influence) const FIVE_POINTS: [(f64, f64); 5] = [
 const THREE_POINTS: [(f64, f64); 3] =
     [(0.0, 2.0 / 3.0), (1.732_050_807_568_877_2, 1.0 / 6.0), (-1.732_050_807_568_877_2, 1.0 / 6.0)];
 
-/// A place with its weight.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weighed {
     pub place: [f64; 2],
@@ -32,11 +29,11 @@ pub(super) struct Weighed {
     pub found: Explained,
 }
 
-/// Places around a minimum that stand for its posterior; `None` where that is cut off or not nearly normal.
+/// Returns weighted places that represent the posterior of a minimum; `None` where it is truncated or not
+/// nearly normal.
 ///
-/// The first normal density is Laplace's, at the minimum. Between presses, where the process knows less, variances change with the place and so
-/// bend the cost: further densities are fitted to the points of the one before. Where none fits, 25 points on a plane have to tell the mean and
-/// the variances that 9 do.
+/// The first normal density is Laplace's approximation; further ones are fitted to the previous points.
+/// Without a sufficient fit, 25 points on a plane have to confirm the moments of 9.
 pub(super) fn around<E: Explain>(reading: &mut E, minimum: &Minimum) -> Option<Vec<Weighed>> {
     let axes = reading.axes();
     let varies = axes.map(|axis| axis.count > 1);
@@ -68,29 +65,27 @@ pub(super) fn around<E: Explain>(reading: &mut E, minimum: &Minimum) -> Option<V
     agree(&points, &finer).then(|| finer.iter().map(Point::weighed).collect())
 }
 
-/// A normal density over the grid, in nodes.
 #[derive(Clone, Copy, Debug)]
 struct Normal {
     mean: [f64; 2],
-    /// The root of the covariance, by which standard normal numbers (u, v) become steps over the grid: (along·u, both·u + across·v).
+    /// Cholesky factor: standard normal (u, v) map to the steps (along·u, both·u + across·v).
     along: f64,
     both: f64,
     across: f64,
 }
 
-/// A point of a rule, in standard deviations, with its weight.
+/// Point with `at` in standard deviations.
 #[derive(Clone, Copy, Debug)]
 struct Point {
     at: [f64; 2],
     place: [f64; 2],
     weight: f64,
     found: Explained,
-    /// Rise of the cost from the middle, less that of the normal density's.
+    /// Rise of the cost minus that of the normal density.
     bend: f64,
 }
 
 impl Point {
-    /// Rise of the normal density's cost from its middle.
     fn rise(&self) -> f64 {
         square(self.at)
     }
@@ -100,12 +95,11 @@ impl Point {
     }
 }
 
-/// Squared distance from the middle.
 fn square([u, v]: [f64; 2]) -> f64 {
     u * u + v * v
 }
 
-/// True of rules that tell the same mean, to a tenth of a standard deviation, and the same variances, to a fifth.
+/// True of equal means to a tenth of a standard deviation, and equal variances to a fifth.
 fn agree(points: &[Point], finer: &[Point]) -> bool {
     let moments = |points: &[Point]| {
         let (mut sum, mut first, mut second) = (0.0, [0.0; 2], [0.0; 2]);
@@ -125,7 +119,6 @@ fn agree(points: &[Point], finer: &[Point]) -> bool {
     })
 }
 
-/// Points and weights of the rule over those axes that vary.
 fn rule(varies: [bool; 2]) -> impl Iterator<Item = ([f64; 2], f64)> {
     const NONE: &[(f64, f64)] = &[(0.0, 1.0)];
     product(match varies {
@@ -136,13 +129,11 @@ fn rule(varies: [bool; 2]) -> impl Iterator<Item = ([f64; 2], f64)> {
     })
 }
 
-/// Points and weights of two rules, the middle first.
 fn product([of_u, of_v]: [&'static [(f64, f64)]; 2]) -> impl Iterator<Item = ([f64; 2], f64)> {
     of_u.iter().flat_map(move |(u, of_u)| of_v.iter().map(move |(v, of_v)| ([*u, *v], of_u * of_v)))
 }
 
 impl Normal {
-    /// Of this mean and covariance: xx, xy and yy.
     fn new(mean: [f64; 2], [xx, xy, yy]: [f64; 3]) -> Self {
         let along = xx.max(0.0).sqrt();
         let both = if along > 0.0 { xy / along } else { 0.0 };
@@ -153,7 +144,6 @@ impl Normal {
         [self.mean[0] + self.along * u, self.mean[1] + self.both * u + self.across * v]
     }
 
-    /// The points of a rule, with the costs that a reading has there; that of the `middle` is known.
     fn points<E: Explain>(
         &self,
         reading: &mut E,
@@ -169,7 +159,7 @@ impl Normal {
         rule.map(point).collect()
     }
 
-    /// True where no edge of the grid, and none of its margins, matters.
+    /// True where edges and margins have no effect.
     fn is_clear(&self, axes: [Axis; 2]) -> bool {
         let deviations = [self.along, self.both.hypot(self.across)];
         (0..2).all(|k| {
@@ -179,11 +169,11 @@ impl Normal {
         })
     }
 
-    /// The density whose logarithm is, in the mean over this one, the nearest to the one that the points have: with c = −2·ln of
-    /// that, the linear and quadratic Hermite polynomials of c are b = E[c·w] and A = E[c·(w·wᵀ − 1)]/2, and the density has the mean −A⁻¹·b/2 and the
-    /// covariance A⁻¹. `None` where it would be far wider or narrower.
+    /// Fits a normal density to the points by least squares of the logarithm, weighted by this density.
+    ///
+    /// With c = −2·ln of the points' density, b = E[c·w] and A = E[c·(w·wᵀ − 1)]/2, the mean is −A⁻¹·b/2 and
+    /// the covariance A⁻¹. `None` where a variance changes more than fourfold.
     fn fitted(&self, points: &[Point], varies: [bool; 2]) -> Option<Self> {
-        /// Greatest change of a variance.
         const MOST_CHANGE: f64 = 4.0;
         let ([mut bu, mut bv], [mut uu, mut uv, mut vv]) = ([0.0; 2], [0.0; 3]);
         for Point { at: [u, v], weight, found, .. } in points {
@@ -194,7 +184,7 @@ impl Normal {
             uv += 0.5 * c * u * v;
             vv += 0.5 * c * (v * v - 1.0);
         }
-        // What does not vary stays as it is.
+        // An axis that does not vary keeps its variance.
         let uu = if varies[0] { uu } else { 1.0 };
         let vv = if varies[1] { vv } else { 1.0 };
         let determinant = uu * vv - uv * uv;

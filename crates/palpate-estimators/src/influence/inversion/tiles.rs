@@ -1,36 +1,32 @@
-//! Tiles around the minima that a posterior is summed over: near an edge it is cut off, where readings tell little it is bent, and several minima
-//! share it. From each minimum the sum goes on to neighbouring tiles as long as they matter.
+//! Integration of a posterior over tiles around its minima, from neighbour to neighbour.
 
 use super::cells::Look;
 use super::minima::{Minimum, least_cost};
 use super::{Explain, Explained};
 
-/// A cost this much above the least has no probability worth adding up: e⁻⁸.
+/// A cost this far above the least has negligible probability: e⁻⁸.
 pub(super) const CUT: f64 = 16.0;
-/// A tile stands for its middle when readings move no further within it, over the noise: on a line, and on a plane, where every halving takes
-/// four times as long.
+/// Greatest change of a reading within a tile, in standard deviations: on a line, and on a plane, where each
+/// halving costs fourfold.
 const FINE: [f64; 2] = [0.5, 1.0];
-/// Least and longest side of a tile, in nodes, of which a length scale has eight.
+/// Range of a tile's side in nodes; a length scale has eight.
 const LEAST_STEP: f64 = 1e-6;
 const MOST_STEP: f64 = 2.0;
-/// Tiles from a minimum that are looked at to either side; where that is not enough they are made larger.
+/// Tiles to either side of a minimum; beyond that they are enlarged.
 const MOST_TILES: usize = 60;
 
-/// Number of the minimum that is nearest to a place.
 fn nearest(minima: &[Minimum], [x, y]: [f64; 2]) -> usize {
     let square = |minimum: &Minimum| (minimum.at[0] - x).powi(2) + (minimum.at[1] - y).powi(2);
     let by_distance = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
     minima.iter().map(square).enumerate().min_by(by_distance).map_or(0, |(i, _)| i)
 }
 
-/// A place that may matter, with about its latent number.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Candidate {
     place: [f64; 2],
     latent: f64,
 }
 
-/// The middles of cells that may matter beside the best minimum, by the minimum that is nearest.
 pub(super) fn candidates<E: Explain>(reading: &E, looks: &[Look], minima: &[Minimum]) -> Vec<Vec<Candidate>> {
     let cells = reading.cells();
     let mut candidates = vec![Vec::new(); minima.len()];
@@ -43,15 +39,13 @@ pub(super) fn candidates<E: Explain>(reading: &E, looks: &[Look], minima: &[Mini
     candidates
 }
 
-/// Tiles of equal size that cover a grid.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lattice {
-    /// Tiles along and across, and the length of one in nodes.
+    /// Number of tiles, and side of a tile in nodes.
     counts: [usize; 2],
     steps: [f64; 2],
 }
 
-/// A tile that its middle stands for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Leaf {
     pub tile: [usize; 2],
@@ -65,7 +59,6 @@ impl Lattice {
         Self { counts, steps: [0, 1].map(|k| (nodes[k] - 1) as f64 / counts[k] as f64) }
     }
 
-    /// Steps within which readings hardly move near a minimum, whatever the latent number.
     fn fine_steps<E: Explain>(reading: &E, minimum: &Minimum) -> [f64; 2] {
         let [x, y, latent] = minimum.at;
         let lengths = reading.lengths([x, y].map(|at| at.round() as usize), latent);
@@ -79,7 +72,7 @@ impl Lattice {
         [step(xx, xt, lengths[0]), step(yy, yt, lengths[1])]
     }
 
-    /// The tiles around minimum `i` that matter and lie nearest to it, from neighbour to neighbour, their weights relative to that of the best minimum.
+    /// Covers the contributing places nearest to minimum `i`, with weights relative to the best minimum.
     pub fn cover<E: Explain>(
         reading: &mut E,
         minima: &[Minimum],
@@ -97,7 +90,7 @@ impl Lattice {
         }
     }
 
-    /// `None` where they reach too far.
+    /// `None` beyond [`MOST_TILES`].
     fn leaves<E: Explain>(
         self,
         reading: &mut E,
@@ -120,7 +113,7 @@ impl Lattice {
             while let Some((tile, latent)) = open.pop() {
                 let place = self.middle(tile);
                 let found = reading.explain(place, latent);
-                // The tile of the minimum itself counts however far its middle is.
+                // The tile of the minimum always counts.
                 let matters = found.cost <= best + CUT || tile == start;
                 if !matters || minima.len() > 1 && nearest(minima, place) != i {
                     continue;
@@ -139,7 +132,7 @@ impl Lattice {
                     }
                 }
             }
-            // Whatever else may matter, apart from all that was reached.
+            // Candidates that are not connected to these tiles.
             let Some(Candidate { place, latent }) = others.next() else { return Some(leaves) };
             let tile = self.tile(*place);
             if is_near(tile) {
@@ -152,7 +145,6 @@ impl Lattice {
         }
     }
 
-    /// The tile of a place.
     fn tile(self, place: [f64; 2]) -> [usize; 2] {
         [0, 1].map(|k| {
             let tile = if self.steps[k] > 0.0 { (place[k] / self.steps[k]) as usize } else { 0 };
@@ -164,12 +156,11 @@ impl Lattice {
         [0, 1].map(|k| (tile[k] as f64 + 0.5) * self.steps[k])
     }
 
-    /// Ends of a tile along axis k, in nodes.
     pub fn span(self, tile: [usize; 2], k: usize) -> (f64, f64) {
         (tile[k] as f64 * self.steps[k], (tile[k] + 1) as f64 * self.steps[k])
     }
 
-    /// In nodes; an axis that does not vary counts for nothing.
+    /// Area in nodes²; an axis without extent has the factor 1.
     fn area(self) -> f64 {
         self.steps.iter().map(|step| if *step > 0.0 { *step } else { 1.0 }).product()
     }

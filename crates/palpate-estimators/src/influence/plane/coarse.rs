@@ -1,59 +1,49 @@
-//! Where to look: the misfit in the middle of every cell of a coarse grid, and its lowest valleys.
+//! Coarse search on a plane: χ² in the middle of every cell, and its local minima.
 //!
-//! Symbols as in [`super::search`]. A cell is two nodes of the table long and wide, and the odd nodes are their middles: no
-//! middle lies on an edge, where a support may hide every contact.
+//! Symbols as in [`super::search`]. A cell is two nodes wide, around an odd node: a support may hide contacts
+//! on an edge.
 
 use super::table::{Patches, PlaneTable};
 use crate::influence::config::ForceBelief;
 use crate::influence::lanes::Lanes;
 
-/// Valleys from which a refinement starts, at most.
 pub(super) const MOST_VALLEYS: usize = 6;
-/// Readings stray from the straight way between two middles, along which reaches are measured.
+/// Allowance for the deviation of readings from the chord between two middles.
 const MARGIN: f64 = 1.1;
 
-/// The influences in the middles of the cells.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Coarse {
     columns: usize,
     rows: usize,
-    /// Length and width of a cell, in metres.
     pub cell_m: [f64; 2],
-    /// f, channel by channel, each in blocks of eight cells.
+    /// f by channel and block of eight cells.
     influences: Vec<Vec<Lanes>>,
-    /// |f|² of every cell.
+    /// |f|².
     norms: Vec<Lanes>,
-    /// For each cell how far a newton's readings within it are from that of its middle, at most, as far as the force does
-    /// not make up for it: half as far as its neighbours' middles.
+    /// Greatest distance of readings within a cell from the middle's, per newton at the best force.
     pub reaches: Vec<f64>,
-    /// For each cell how far apart those of its ends are, along and across.
+    /// Distance between readings of a cell's ends, at the best force.
     pub lengths: Vec<[f64; 2]>,
-    /// The same with one force all over the cell, where it is not known.
+    /// Distance at equal forces.
     pub whole_lengths: Vec<[f64; 2]>,
 }
 
-/// Memory of one scan.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Profile {
-    /// The misfit of every cell, and fillers behind.
     misfits: Vec<Lanes>,
-    /// The best force of every cell, where it is not known.
     forces: Vec<Lanes>,
 }
 
 impl Profile {
-    /// The misfit of every cell, and fillers behind.
     pub fn misfits(&self) -> &[f64] {
         self.misfits.as_flattened()
     }
 
-    /// The best force in a cell, in newtons.
     pub fn force_n(&self, cell: usize, force: ForceBelief) -> f64 {
         force.known_n().unwrap_or_else(|| self.forces.as_flattened()[cell])
     }
 }
 
-/// A valley of a profile.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Valley {
     pub cell: usize,
@@ -61,7 +51,6 @@ pub(super) struct Valley {
 }
 
 impl Coarse {
-    /// Coarse cells of whitened patches with so many channels.
     pub fn new(table: &PlaneTable, patches: &Patches, channels: usize, force: ForceBelief) -> Self {
         let (columns, rows) = ((table.columns - 1) / 2, (table.rows - 1) / 2);
         let blocks = (columns * rows).div_ceil(8);
@@ -85,19 +74,16 @@ impl Coarse {
         coarse
     }
 
-    /// Number of cells.
     pub fn cells(&self) -> usize {
         self.columns * self.rows
     }
 
-    /// The middle of a cell, in metres.
     pub fn middle_m(&self, cell: usize) -> [f64; 2] {
         let (column, row) = (cell % self.columns, cell / self.columns);
         [(column as f64 + 0.5) * self.cell_m[0], (row as f64 + 0.5) * self.cell_m[1]]
     }
 
-    /// Distance of the readings of a newton in two cells; where nothing is known of the force, of one that is as
-    /// strong in the second cell's readings as a newton is in the first's.
+    /// Distance of readings per newton; at unknown force, after scaling to equal strength.
     fn distance(&self, first: usize, second: usize, force: ForceBelief) -> f64 {
         let at = |blocks: &[Lanes], cell: usize| blocks.as_flattened()[cell];
         let scale = match force {
@@ -128,7 +114,7 @@ impl Coarse {
         ]
     }
 
-    /// The misfit of every cell, with the best force there, of a whitened reading of length `square`.
+    /// Computes χ² of every cell at the best force; `square` is |d|².
     pub fn scan(&self, whitened: &[f64], square: f64, force: ForceBelief, profile: &mut Profile) {
         let Profile { misfits, forces } = profile;
         misfits.clear();
@@ -161,7 +147,6 @@ impl Coarse {
         }
     }
 
-    /// The lowest valleys and how many, lowest first: cells no higher than all their neighbours.
     pub fn valleys(&self, profile: &Profile) -> ([Valley; MOST_VALLEYS], usize) {
         let misfits = profile.misfits();
         let (mut lowest, mut count) = ([Valley::default(); MOST_VALLEYS], 0);
@@ -195,7 +180,6 @@ impl Coarse {
     }
 }
 
-/// A place and those before and behind it.
 fn around(at: usize, count: usize) -> std::ops::Range<usize> {
     at.saturating_sub(1)..(at + 2).min(count)
 }

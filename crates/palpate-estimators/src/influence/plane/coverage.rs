@@ -1,4 +1,5 @@
-//! Coverage of contacts of unknown force by their distance from the edge of the plate of `examples/plate.toml`: a sample of the experiment `plate-edges`.
+//! Coverage near the edges of the plate of `examples/plate.toml` at unknown force: a sample of the experiment
+//! `plate-edges`.
 
 use crate::fit::{FitTask, Locate};
 use crate::fixtures::{Covered, Example, plate};
@@ -12,11 +13,9 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::PlaneLocator;
 
-/// Force of the presses and of contacts, in newtons, and length and width of the plate in metres.
 const PRESSES_N: f64 = 5.0;
 const CONTACTS_N: [f64; 2] = [2.0, 20.0];
 const SIDE_M: f64 = 0.3;
-/// Calibrations, and readings of each at every distance.
 const CALIBRATIONS: u64 = 2;
 const READINGS: usize = 100;
 
@@ -32,12 +31,11 @@ fn fit(bench: &Example, seed: u64) -> PlaneLocator {
     Influence::default().fit_plane(FitTask::new(&bench.setup, &bench.simulate(seed))).unwrap()
 }
 
-/// A place of contacts.
 #[derive(Clone, Copy, Debug)]
 enum Place {
-    /// So far from the left edge, in millimetres, and 60 mm or more from the others.
+    /// Millimetres from the left edge; at least 60 mm from the others.
     Edge(f64),
-    /// So far from the left and from the lower edge.
+    /// Millimetres from the left and lower edge.
     Corner(f64),
 }
 
@@ -50,14 +48,14 @@ impl Place {
     }
 }
 
-/// Of rows with a few readings nothing is asked. The interval of a force may hold more than 95 %: in a corner it is nearly that of all forces.
+/// Force intervals may cover more than 95 %: in a corner they include nearly all forces.
 fn check(row: &Covered, place: Place) {
     assert!(row.outside == 0 && row.greatest_n <= 10.0 * PRESSES_N, "{place:?}: {row:?}");
     if row.found < 100 {
         return;
     }
     assert!(100 * row.doubted <= 2 * row.found, "{place:?}: {row:?}");
-    // Four standard deviations of the detected readings, around the 94.3 to 97.0 % of the experiment's rows of which all are detected.
+    // Four standard deviations around the 94.3–97.0 % of the experiment's rows with full detection.
     let margin = 400.0 * (0.95 * 0.05 / row.found as f64).sqrt();
     let [x, y, force] = [row.along, row.across, row.force].map(|count| row.percent(count));
     let least = 95.0 - margin;

@@ -1,26 +1,25 @@
-//! Distances of contacts from the edges of a plane, in what readings tell of them.
+//! Distances of contacts from the edges of a plane, in standard deviations.
 //!
-//! Beside an edge that a support holds readings keep their shape while their size goes to zero: what tells a place from the edge is the
-//! part of its readings that no contact at the edge has, whatever its force and its place along the edge.
+//! Next to a supported edge only the size of readings vanishes. The distance is the part of a reading that no
+//! contact at the edge explains, at any force and place along it.
 
 use super::table::{Patches, PlaneTable};
 use crate::influence::lanes::Lanes;
 
-/// Whitened distances of a newton's readings from those of contacts at the edges, at the nodes of a table.
+/// Whitened distances per newton at the nodes of a table.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Edges {
     columns: usize,
     rows: usize,
     inverse_spacing: [f64; 2],
-    /// From the nearer of the left and the right edge, and of the lower and the upper.
+    /// From the nearer edges along and across.
     per_newton: Vec<[f64; 2]>,
 }
 
-/// Contacts at an edge are so much of a side away from it: a support hides those at the edge itself.
+/// Relative distance of edge contacts from the edge, where a support hides them.
 const BESIDE: f64 = 1e-5;
 
 impl Edges {
-    /// The distances of the nodes of a table, by its whitened patches and the weights of the groups of each node.
     pub fn new(table: &PlaneTable, patches: &Patches, weights: &[Lanes]) -> Self {
         let size_m = [table.length_m, table.width_m];
         let spacing_m = table.spacing_m();
@@ -28,7 +27,7 @@ impl Edges {
             let place = patches.place(x_m, y_m);
             (0..patches.groups).flat_map(|group| patches.value(&place, group)).collect()
         };
-        // Readings at an edge across the k-th side, beside each node along it, and their change along the edge.
+        // Readings beside an edge across side k, and their change along the edge.
         let at_edge = |k: usize, side: f64| -> Vec<[Vec<f64>; 2]> {
             let count = [table.rows, table.columns][k];
             let beside = |along: f64| {
@@ -64,7 +63,6 @@ impl Edges {
         }
     }
 
-    /// The distances of a contact from the nearer edges along and across, in standard deviations.
     pub fn distances(&self, [x_m, y_m, force_n]: [f64; 3]) -> [f64; 2] {
         let cell = |at_m: f64, inverse: f64, count: usize| {
             let place = (at_m * inverse).clamp(0.0, (count - 1) as f64);
@@ -83,7 +81,7 @@ impl Edges {
     }
 }
 
-/// Length of the remainder of a reading without its parts along two others.
+/// Norm of a reading without its components along two others.
 fn part_outside(reading: &[f64], [first, second]: &[Vec<f64>; 2], weights: &[f64]) -> f64 {
     let product =
         |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).zip(weights).map(|((a, b), w)| w * a * b).sum() };

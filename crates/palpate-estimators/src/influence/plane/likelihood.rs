@@ -1,6 +1,4 @@
-//! How well a contact explains a reading, by the table of a plane's influence functions: what tracking asks.
-//!
-//! Symbols as in [`super::search`].
+//! Likelihood of contacts on a plane, for tracking; symbols as in [`super::search`].
 
 use super::locator::PlaneLocator;
 use super::search::Search;
@@ -17,18 +15,18 @@ use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::small::{Ldl, form};
 
-/// The likelihood of a [`PlaneLocator`], ready to be asked often.
+/// Likelihood of a [`PlaneLocator`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlateLikelihood {
     locator: PlaneLocator,
-    /// The locator's, without what is believed of an unknown force: that is told once, and not with every reading.
+    /// Search without the normal prior of the force, which tracking applies once.
     search: Search,
     untouched: UntouchedSurface,
     interval_check: Option<IntervalCheck>,
 }
 
 impl PlateLikelihood {
-    /// The likelihood of the channels that a locator does not leave out.
+    /// Builds the likelihood of the channels in use.
     pub fn new(locator: &PlaneLocator) -> Self {
         let force = locator.force().known_n().map_or(ForceBelief::Unknown, ForceBelief::Known);
         Self {
@@ -39,13 +37,11 @@ impl PlateLikelihood {
         }
     }
 
-    /// The likelihood with the scatter and the drift of the untouched surface.
     #[must_use]
     pub(crate) fn with_untouched(self, untouched: UntouchedSurface) -> Self {
         Self { untouched, ..self }
     }
 
-    /// The likelihood with the check of the locator's intervals.
     #[must_use]
     pub(crate) fn with_interval_check(self, interval_check: Option<IntervalCheck>) -> Self {
         Self { interval_check, ..self }
@@ -77,7 +73,7 @@ impl Likelihood for PlateLikelihood {
         self.search.signal(contact)
     }
 
-    /// A⁻¹·B·A⁻¹ with A = Σ w·j·jᵀ and B = Σ w²·v·j·jᵀ, j the derivatives of W·f by place and unknown force.
+    /// A⁻¹·B·A⁻¹, A = Σ w·j·jᵀ, B = Σ w²·v·j·jᵀ, j the derivatives of W·f.
     fn calibration_variance(&self, contacts: &[Contact]) -> [CalibrationVariance; 2] {
         let mut left = [CalibrationVariance::default(); 2];
         let free = [true, true, self.known_force_n().is_none()];

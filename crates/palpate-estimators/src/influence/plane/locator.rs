@@ -1,4 +1,4 @@
-//! A fitted influence locator of a plane with a model.
+//! Fitted influence locator of a plane with a model.
 
 use super::posterior::{Scratch, locate};
 use super::search::Search;
@@ -12,7 +12,7 @@ use crate::status::FalseAlarmRate;
 use palpate_core::Estimate;
 use serde::{Deserialize, Serialize};
 
-/// Influence functions over a plane, ready to be inverted.
+/// Locator that inverts the influence functions of a plane.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct PlaneLocator {
@@ -20,17 +20,16 @@ pub struct PlaneLocator {
     search: Search,
 }
 
-/// The part of a locator that its file holds.
+/// Contents of a locator file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Stored {
-    /// Influence functions.
     table: PlaneTable,
     channels: Channels,
     force: ForceBelief,
 }
 
-/// Memory for locating readings on a plane, to be used again.
+/// Reusable memory for locating readings on a plane.
 #[derive(Clone, Debug, Default)]
 pub struct PlaneScratch(Scratch);
 
@@ -39,52 +38,49 @@ impl PlaneLocator {
         Stored { table, channels, force }.into_locator()
     }
 
-    /// The influence functions.
+    /// Returns the influence functions.
     pub fn table(&self) -> &PlaneTable {
         &self.stored.table
     }
 
-    /// The influence functions with their uncertainty, at the nodes of the table.
+    /// Returns the influence functions with their uncertainty at the nodes.
     pub fn influences_at_nodes(&self) -> InfluencesAtNodes {
         let Stored { table, channels, .. } = &self.stored;
         let positions = (0..table.nodes()).map(|node| table.node(node)).collect();
         InfluencesAtNodes::of_table(positions, channels, [&table.values, &table.variances])
     }
 
-    /// Offsets, noise, and which channels are left out.
     pub(in crate::influence) fn channels(&self) -> &Channels {
         &self.stored.channels
     }
 
-    /// Knowledge of the force.
+    /// Returns the prior of the force.
     pub fn force(&self) -> ForceBelief {
         self.stored.force
     }
 
-    /// Offset of each channel, in its SI unit.
+    /// Returns the offset of each channel, in its SI unit.
     pub fn offsets(&self) -> &[f64] {
         &self.stored.channels.offsets
     }
 
-    /// Share of untouched readings that may be taken for a contact.
+    /// Returns the false-alarm rate of untouched readings.
     pub fn false_alarm_rate(&self) -> FalseAlarmRate {
         self.stored.channels.false_alarm_rate
     }
 
-    /// Leaves channel `channel` (from 0) out of all sums from now on; false when no channel would be left, and then
-    /// nothing changes.
+    /// Disables channel `channel` (from 0); returns false, without a change, when no channel would remain.
     pub fn leave_out(&mut self, channel: usize) -> bool {
         let Some(channels) = self.stored.channels.without(channel) else { return false };
         *self = Stored { channels, ..self.stored.clone() }.into_locator();
         true
     }
 
-    /// The search with another knowledge of the force.
     pub(super) fn search_with(&self, force: ForceBelief) -> Search {
         Search::new(&self.stored.table, &self.stored.channels, force)
     }
 
-    /// [`Locate::locate`] with memory of the caller's.
+    /// Locates a reading with reusable memory.
     pub fn locate_with(&self, reading: &[f64], scratch: &mut PlaneScratch) -> Estimate {
         locate(&self.search, reading, &mut scratch.0)
     }
@@ -114,7 +110,6 @@ impl Stored {
         PlaneLocator { search: Search::new(&self.table, &self.channels, self.force), stored: self }
     }
 
-    /// Checks what a file may have got wrong.
     fn check(&self) -> Result<(), LocatorFault> {
         let Self { table, channels, force } = self;
         let count = LocatorFault::check_count;

@@ -1,5 +1,4 @@
-//! Influence functions of a plane with a model, and their inversion: bicubic patches over a grid, searched coarsely and
-//! refined by Levenberg's steps.
+//! Influence functions of a plane with a model, and their inversion.
 
 mod coarse;
 mod edges;
@@ -19,7 +18,6 @@ use super::learning::{LearntInfluence, NODES_EACH, learn};
 use crate::fit::FitTask;
 use palpate_mechanics::contact::Position;
 
-/// Fits the influence functions of a plane with a model.
 pub(super) fn fit(config: Influence, task: FitTask) -> Result<PlaneLocator, InfluenceFitError> {
     if config.contacts > 1 {
         return Err(InfluenceFitError::NotOnPlane { what: "locating several contacts" });

@@ -1,10 +1,7 @@
-//! The contacts on a plane that a reading does not exclude, where nothing is known of the force and no normal distribution describes them.
+//! Profile-likelihood intervals of x, y and an unknown force on a plane.
 //!
-//! Beside an edge a harder contact nearer to it reads like a softer one farther away, as at the ends of a line ([`crate::trade_off`]).
-//! The 95 % intervals of x, y and force are by the likelihood ratio, as there: each holds every value with which some contact's cost, minus
-//! twice the logarithm of its likelihood, is at most q above the least. q falls from 3.84 to 2.71 towards the edges that bound the value,
-//! such that contacts beside them are covered as often as others. The parts over which the posterior was summed up say from where on the
-//! farthest such values are to be looked for: each end is followed outwards from there, the other two unknowns being the best.
+//! As on a line ([`crate::trade_off`]), an interval contains every value with a profile cost (−2·ln of the
+//! likelihood) at most q above the least; q falls from 3.84 to 2.71 towards the edges that bound the value.
 
 use super::search::{Minimum, Search};
 use crate::influence::levenberg::{Unknowns, descend};
@@ -13,73 +10,62 @@ use palpate_core::Uncertainty;
 use palpate_numerics::chi_squared_critical_value;
 use std::sync::OnceLock;
 
-/// The part of a reading beyond what a contact must take off it, up to which nothing is excluded.
+/// Signal beyond the cost of a contact, up to which intervals include all values.
 ///
-/// A contact too soft to be found is found where noise makes its reading look like another's, which explains it better by what was missing
-/// and by χ² of the three unknowns, greater than this in 2 % of the readings. With the likelihood ratio alone 91 % of the places were covered
-/// where a third of the contacts are found (`plane/coverage.rs`).
+/// Near the detection threshold, noise can imitate another contact. χ² of the three unknowns exceeds this
+/// limit in 2 % of the readings.
 fn faint() -> f64 {
     const RATE: f64 = 0.02;
     static KNOWN: OnceLock<f64> = OnceLock::new();
     *KNOWN.get_or_init(|| chi_squared_critical_value(RATE, 3))
 }
 
-/// A step that lowers the misfit by less than this is the last one.
 const SMALL: f64 = 0.02;
-/// An end is as exact as this, in standard deviations.
+/// Accuracy of an end, in standard deviations.
 const CLOSE: f64 = 0.003;
-/// A value so many standard deviations beyond the end says little of where the end is: the way to it is halved.
+/// Standard deviations beyond an end, above which the way is halved.
 const STEEP: f64 = 3.0;
-/// Contacts that are tried between one that is not excluded and one that is.
 const ROUNDS: usize = 12;
-/// Number of the force among the unknowns.
 const FORCE: usize = 2;
 
-/// 95 % intervals of x, y and force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct NotExcluded([(f64, f64); 3]);
 
 impl NotExcluded {
-    /// Writes the intervals over others.
     pub fn write(&self, uncertainty: &mut Uncertainty) {
         let Self([x_95_m, y_95_m, force_95_n]) = *self;
         *uncertainty = Uncertainty { x_95_m, y_95_m, force_95_n: Some(force_95_n), ..*uncertainty };
     }
 }
 
-/// A place that was looked at, with the best force there.
+/// Evaluated place with the best force.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Looked {
-    /// x, y and the force that is best there.
+    /// x, y and force.
     pub at: Unknowns,
-    /// Minus twice the logarithm of its likelihood, but for a constant.
+    /// −2·ln of the likelihood, less a constant.
     pub cost: f64,
-    /// Lengths from which on other values of the three are looked for.
+    /// First steps of the search for interval ends.
     pub steps: [f64; 3],
 }
 
-/// One of x, y and force that is followed, and its way.
 #[derive(Clone, Copy, Debug)]
 struct Way {
-    /// Number among the three.
     unknown: usize,
     /// −1 downwards, 1 upwards.
     side: f64,
-    /// Last value at the latest.
     limit: f64,
 }
 
-/// A contact, and the distance of each of x, y and force from being excluded with it.
 #[derive(Clone, Copy, Debug)]
 struct Found {
     at: Unknowns,
-    /// Root of what the cost is above the least, less that of q: a value is excluded where this is more than 0.
+    /// √(cost − least) − √q; positive where excluded.
     beyond: [f64; 3],
 }
 
 impl Search {
-    /// The 95 % intervals of a whitened reading of length `square`, with its minima, best first, and the places that were looked at. They hold
-    /// the estimate.
+    /// Returns intervals that contain `estimate`; `square` is |d|², `minima` are sorted.
     pub fn not_excluded(
         &self,
         (whitened, square): (&[f64], f64),
@@ -111,7 +97,6 @@ impl Search {
         }))
     }
 
-    /// The place of a minimum.
     fn looked_at(&self, whitened: &[f64], minimum: &Minimum) -> Looked {
         let [x_m, y_m, _] = minimum.at;
         let best = self.profiled(whitened, [x_m, y_m]);
@@ -124,11 +109,9 @@ impl Search {
     }
 }
 
-/// A reading whose intervals are looked for.
 struct Reading<'a> {
     search: &'a Search,
     whitened: &'a [f64],
-    /// The least cost of all contacts.
     least: f64,
 }
 
@@ -141,7 +124,7 @@ impl Reading<'_> {
         Found { at, beyond }
     }
 
-    /// The contact with one value of an unknown and the best of the others, looked for from another contact on.
+    /// Contact with the other unknowns profiled.
     fn held(&self, unknown: usize, value: f64, from: &Found) -> Found {
         let Self { search, whitened, .. } = *self;
         let mut start = from.at;
@@ -161,7 +144,7 @@ impl Reading<'_> {
         self.found(at, best.misfit_with(at[FORCE]) + search.spread(place))
     }
 
-    /// The last value on a way that is not excluded; `None` where there is none among likely contacts.
+    /// Last included value; `None` where no likely contact is included.
     fn end(&self, way: Way, likely: &[(Found, [f64; 3])]) -> Option<f64> {
         let Way { unknown, side, limit } = way;
         let is_inside = |found: &Found| found.beyond[unknown] <= 0.0;
@@ -186,8 +169,7 @@ impl Reading<'_> {
         }
     }
 
-    /// The last value between a contact that is not excluded and one that is, by Illinois' regula falsi (Dowell and Jarratt, BIT 11, 1971):
-    /// an end that stays counts half.
+    /// Last included value, by the Illinois method (Dowell and Jarratt, BIT 11, 1971).
     fn between(&self, unknown: usize, mut inside: Found, mut outside: Found) -> f64 {
         let (mut stayed, mut weights) = (None, [1.0, 1.0]);
         for _ in 0..ROUNDS {

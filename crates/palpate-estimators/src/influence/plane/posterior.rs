@@ -1,12 +1,8 @@
-//! The posterior of a contact on a plane: how probable the surroundings of each minimum are, moments of position and force there, and the
-//! estimate that they give.
+//! Posterior of a contact on a plane with a prior flat over the surface and in the size of the signal.
 //!
-//! A minimum that is alone, narrow, clear of the edges and no more bent than a paraboloid is a normal distribution (Laplace's
-//! approximation), of places and, where the best force is straight as well, of forces. Any other reading's probability is summed up over
-//! the surface: near an edge it is cut off, where the readings tell little it is bent, and several minima share it. Of the coarse cells
-//! those that could matter are halved until the misfit is smooth within their parts, each with the force that is best there; a part that
-//! is too far from the reading is left out with all that it holds. The prior is flat over the surface, and in the size of the signal.
-//! Intervals of what is no normal distribution are those of `not_excluded` where nothing is known of the force.
+//! A single minimum that is narrow, away from the edges and nearly parabolic is a normal distribution
+//! (Laplace's approximation). Any other posterior is integrated: relevant coarse cells are halved until χ² is
+//! smooth within each part, at the best force. For an unknown force, `not_excluded` then gives the intervals.
 
 use super::coarse::{MOST_VALLEYS, Profile};
 use super::not_excluded::Looked;
@@ -20,22 +16,14 @@ use palpate_mechanics::contact::Position;
 use palpate_numerics::small::{Ldl, principal_direction, principal_variances};
 use palpate_numerics::{ELLIPSE_95, clamped_interval, normal_interval_95};
 
-/// Memory for locating readings.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scratch {
     whitened: Vec<f64>,
     profile: Profile,
-    /// Parts of the surface that are still to be looked at.
     blocks: Vec<Block>,
-    /// Those that hold the probability.
     leaves: Vec<Leaf>,
 }
 
-/// The estimate of one contact.
-///
-/// The time of a plain reading is that of the scan, a product for every coarse cell and channel, and of some six of
-/// Levenberg's steps, 16 corner numbers × 3 sums for every group of eight channels each. Where the probability is summed up
-/// instead, it is that of the misfit at a thousand places or so.
 pub(super) fn locate(search: &Search, reading: &[f64], scratch: &mut Scratch) -> Estimate {
     let square = search.whiten(reading, &mut scratch.whitened);
     let (minima, count) = search.minima(square, &scratch.whitened, &mut scratch.profile);
@@ -67,7 +55,6 @@ fn position([x_m, y_m, _]: Unknowns) -> Position {
     Position { x_m, y_m }
 }
 
-/// A contact with an uncertainty that is held to the surface.
 fn contact(search: &Search, mode: &Mode, covariance: [f64; 6]) -> ContactEstimate {
     let interval = |k: usize, variance: f64| {
         clamped_interval(normal_interval_95(mode.mean[k], variance.sqrt()), search.size_m[k])
@@ -80,77 +67,70 @@ fn contact(search: &Search, mode: &Mode, covariance: [f64; 6]) -> ContactEstimat
     };
     ContactEstimate {
         position: position(mode.mean),
-        // A mean of forces at the bound is beyond it by rounding.
+        // Rounding can move a mean of forces beyond the bound.
         force_n: Some(mode.mean[2].min(search.greatest_force_n)),
         uncertainty: Some(uncertainty),
     }
 }
 
-/// The surroundings of a minimum.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Mode {
-    /// Share of the probability.
+    /// Probability.
     pub weight: f64,
-    /// Mean of x, y and W.
+    /// x, y and W.
     pub mean: [f64; 3],
-    /// Covariance of the three: xx, xy, xf, yy, yf, ff.
+    /// xx, xy, xf, yy, yf, ff.
     pub covariance: [f64; 6],
 }
 
-/// The posterior of a contact, mode by mode.
 #[derive(Clone, Copy, Debug)]
 struct Surroundings {
     modes: [Mode; MOST_VALLEYS],
     count: usize,
-    /// Covariance about the mean of the first mode: of the normal distribution whose 95 % ellipse is as large as one of this
-    /// shape must be to hold 95 % of the probability.
+    /// Covariance of a 95 % ellipse with 95 % of the probability.
     pub region: [f64; 6],
     pub shape: Shape,
 }
 
-/// Shape of the posterior.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Shape {
-    /// A normal distribution.
+    /// Normal in places and forces.
     Normal,
-    /// A normal distribution of places, but not of forces.
+    /// Normal in places only.
     Bent,
-    /// Summed up over parts of the surface.
+    /// Integrated over parts.
     Summed,
-    /// None, of a reading that could not be summed up.
+    /// Without a fit.
     Unexplained,
 }
 
 impl Surroundings {
-    /// The most probable first.
+    /// Most probable first.
     pub fn modes(&self) -> &[Mode] {
         &self.modes[..self.count]
     }
 }
 
-/// A minimum with a wider standard deviation, in lengths of a coarse cell, is no paraboloid.
+/// Greatest standard deviation of a paraboloid, in lengths of a coarse cell.
 const MOST_CELLS: f64 = 0.6;
-/// So many standard deviations from an edge, an edge does not matter.
+/// Distance from an edge without effect, in standard deviations.
 const CLEAR: f64 = 3.0;
-/// At two standard deviations a paraboloid is 4 above its minimum; what is off by more than this is bent.
+/// Greatest deviation from a rise of 4 at two standard deviations.
 const MOST_BENT: f64 = 1.0;
-/// So many standard deviations the best force there may be off the straight way.
+/// Greatest nonlinearity of the best force, in standard deviations.
 const MOST_BENT_FORCE: f64 = 0.25;
-/// A misfit this much above the best has no probability worth adding up: e⁻⁶.
+/// Rise of the cost to a negligible probability: e⁻⁶.
 const CUT: f64 = 12.0;
-/// A block stands for its middle when its whitened length is no longer: the sum over a normal distribution at steps of h
-/// standard deviations is off by 2·e^(−2π²/h²), a hundredth.
+/// Greatest whitened length of a block: a sum over a normal distribution at steps of h standard deviations
+/// errs by 2·e^(−2π²/h²), a hundredth.
 const FINE: f64 = 2.0;
-/// A part in whose middle the best force is more than so much of the greatest may have places where that holds it.
+/// Share of the greatest force above which that bound may be active within a block.
 const HELD: f64 = 0.5;
-/// No block is halved below this, however loud the readings are.
 const LEAST_M: f64 = 1e-9;
-/// More parts than any reading takes that the surface explains. One that is far too loud for it has as many as there are
-/// nanometres, all of them as far from it.
+/// Only readings far beyond the model need more.
 const MOST_BLOCKS: usize = 200_000;
 
 impl Search {
-    /// The surroundings of `minima`, best first, of the reading in the scratch.
     fn surroundings(&self, minima: &[Minimum], scratch: &mut Scratch) -> Surroundings {
         let mut modes = [Mode::default(); MOST_VALLEYS];
         let are_plain = minima.iter().zip(&mut modes).all(|(minimum, mode)| {
@@ -172,8 +152,8 @@ impl Search {
         }
     }
 
-    /// A minimum as a normal distribution, its weight relative to that of `best`; `None` where it is wide, near an edge, or
-    /// not told at all.
+    /// Normal distribution weighted relative to `best`; `None` where the minimum is wide, near a bound or
+    /// undetermined.
     fn plain(&self, minimum: &Minimum, best: &Minimum) -> Option<Mode> {
         let covariance = self.covariance(minimum)?;
         let [xx, xy, _, yy, ..] = covariance;
@@ -183,19 +163,19 @@ impl Search {
                 && CLEAR * sd_m[k] < minimum.at[k]
                 && CLEAR * sd_m[k] < self.size_m[k] - minimum.at[k]
         });
-        // An infinite bound is above all.
+        // Also true of an infinite bound.
         let is_free = CLEAR * covariance[5].sqrt() < self.greatest_force_n - minimum.at[2];
         let volume = 2.0 * std::f64::consts::PI * (xx * yy - xy * xy).max(0.0).sqrt();
         let weight = (0.5 * (self.cost(best) - self.cost(minimum))).exp() * volume;
         (narrow && is_free && weight.is_finite()).then_some(Mode { weight, mean: minimum.at, covariance })
     }
 
-    /// Minus twice the logarithm of the likelihood, but for a constant.
+    /// −2·ln of the likelihood, less a constant.
     fn cost(&self, minimum: &Minimum) -> f64 {
         minimum.misfit + self.spread([minimum.at[0], minimum.at[1]])
     }
 
-    /// Shape of the posterior of a mode that is alone, by the misfit and the best force two standard deviations away along both axes.
+    /// Shape by χ² and best force two standard deviations away along both axes.
     fn shape(&self, whitened: &[f64], mode: &Mode) -> Shape {
         let [xx, xy, _, yy, _, ff] = mode.covariance;
         let [longer, shorter] = principal_variances([xx, xy, yy]).map(f64::sqrt);
@@ -216,14 +196,13 @@ impl Search {
         if ends.iter().all(is_straight) { Shape::Normal } else { Shape::Bent }
     }
 
-    /// The inverse of the information; `None` where the reading does not tell.
     fn covariance(&self, minimum: &Minimum) -> Option<[f64; 6]> {
         let free = [true, true, self.force.known_n().is_none()];
         let [[xx, xy, xf], [_, yy, yf], [_, _, ff]] = Ldl::of_free(&minimum.information, free)?.inverse();
         Some([xx, xy, xf, yy, yf, ff])
     }
 
-    /// Puts the parts of the surface that hold the probability into the scratch; false where they are too many.
+    /// Collects relevant parts in `leaves`; false where they are too many.
     fn sum_up(&self, minima: &[Minimum], scratch: &mut Scratch) -> bool {
         let Scratch { whitened, profile, blocks, leaves } = scratch;
         leaves.clear();
@@ -276,7 +255,6 @@ impl Search {
         true
     }
 
-    /// The modes of what was summed up: what lies nearest to a minimum is its mode's.
     fn summed(&self, minima: &[Minimum], leaves: &mut [Leaf]) -> Surroundings {
         let mut moments = [Moments::default(); MOST_VALLEYS];
         let mut all = Moments::default();
@@ -304,13 +282,12 @@ impl Search {
         Surroundings { modes, count, region: covariance.map(|value| growth * value), shape: Shape::Summed }
     }
 
-    /// Variance of a force at a place that is known.
     fn own_variance(&self, minimum: &Minimum) -> f64 {
         let told = minimum.information[2][2];
         if self.force.known_n().is_some() || told <= 0.0 { 0.0 } else { 1.0 / told }
     }
 
-    /// The posterior of a reading that no part of the surface explains: its minimum, with the variance of the whole surface.
+    /// Variance of a uniform distribution over the surface.
     fn nothing_summed(&self, minimum: &Minimum) -> Surroundings {
         let [xx, yy] = self.size_m.map(|size_m| size_m * size_m / 12.0);
         let region = [xx, 0.0, 0.0, yy, 0.0, self.own_variance(minimum)];
@@ -320,7 +297,6 @@ impl Search {
     }
 }
 
-/// The mode of what lies nearest to a minimum; without a weight where that is nothing.
 fn mode_of(moments: &Moments, minimum: &Minimum) -> Mode {
     if moments.weight <= 0.0 {
         return Mode { weight: 0.0, mean: minimum.at, covariance: [0.0; 6] };
@@ -329,7 +305,7 @@ fn mode_of(moments: &Moments, minimum: &Minimum) -> Mode {
     Mode { weight: moments.weight, mean, covariance }
 }
 
-/// Factor by which a covariance must grow for its 95 % ellipse about a place to hold 95 % of the leaves.
+/// Factor of a covariance for a 95 % ellipse with 95 % of the leaves.
 fn growth(leaves: &mut [Leaf], about: [f64; 3], covariance: &[f64; 6]) -> f64 {
     let [xx, xy, _, yy, ..] = *covariance;
     let Some(factors) = Ldl::new(&[[xx, xy], [xy, yy]]) else { return 1.0 };
@@ -338,7 +314,7 @@ fn growth(leaves: &mut [Leaf], about: [f64; 3], covariance: &[f64; 6]) -> f64 {
     }
     leaves.sort_unstable_by(|a, b| a.distance.total_cmp(&b.distance));
     let all: f64 = leaves.iter().map(|leaf| leaf.weight).sum();
-    // Half of a leaf lies within the ellipse through its middle; between leaves the share is straight.
+    // Half of a leaf lies within the ellipse through its middle; shares are interpolated between leaves.
     let (mut inside, mut last) = (0.0, (0.0, 0.0));
     for leaf in &*leaves {
         let held = (inside + 0.5 * leaf.weight) / all;
@@ -353,34 +329,32 @@ fn growth(leaves: &mut [Leaf], about: [f64; 3], covariance: &[f64; 6]) -> f64 {
     1.0
 }
 
-/// A part of the surface that its middle stands for.
 #[derive(Clone, Copy, Debug)]
 struct Leaf {
-    /// Probability, but for a factor.
+    /// Unnormalized.
     weight: f64,
     looked: Looked,
-    /// Index of the nearest minimum.
     mode: usize,
-    /// Squared, from the estimate, in standard deviations.
+    /// Squared distance from the estimate, in standard deviations.
     distance: f64,
 }
 
-/// A part of the surface, which is halved until its middle stands for it.
+/// Part of the surface, halved until its middle represents it.
 #[derive(Clone, Copy, Debug)]
 struct Block {
     middle_m: [f64; 2],
     size_m: [f64; 2],
-    /// Distance of the whitened readings of its ends, along and across.
+    /// Whitened distance between the readings of its ends.
     length: [f64; 2],
-    /// The same of contacts with the greatest force, which does not make up for what the place changes.
+    /// Length at the greatest force.
     held_length: [f64; 2],
 }
 
 impl Block {
-    /// Lengths where the greatest force could hold contacts within it, by the best in its middle, or those of elsewhere.
+    /// Lengths at the greatest force where that bound may be active.
     fn length_with(&self, best: &Profiled, greatest_force_n: f64) -> [f64; 2] {
         let is_near = best.force_n > HELD * greatest_force_n;
-        // The readings of contacts with the greatest force, as weak as anywhere within, are then weaker than the best's in the middle.
+        // At the weakest place within, the greatest force then reads less than the best force in the middle.
         let reach = 0.5 * self.held_length[0].hypot(self.held_length[1]);
         if is_near && greatest_force_n - best.force_n < reach * best.sd_n() {
             self.held_length
@@ -389,7 +363,7 @@ impl Block {
         }
     }
 
-    /// Halves along the longer way; `None` where it is short both ways.
+    /// Halves the longer side; `None` where both are short.
     fn halves(&self, length: [f64; 2]) -> Option<[Self; 2]> {
         let k = usize::from(length[1] > length[0]);
         if length[k].is_nan() || length[k] <= FINE || self.size_m[k] <= LEAST_M {
@@ -407,14 +381,13 @@ impl Block {
     }
 }
 
-/// About the least misfit within a part of such lengths, from that of its middle.
+/// Approximate lower bound of χ² within a part.
 fn floor_within(misfit: f64, length: [f64; 2]) -> f64 {
     let reach = 0.5 * length[0].hypot(length[1]);
     let closest = (misfit.max(0.0).sqrt() - reach).max(0.0);
     closest * closest
 }
 
-/// Which minimum is nearest to a place.
 fn nearest(minima: &[Minimum], at: [f64; 2]) -> usize {
     if minima.len() == 1 {
         return 0;

@@ -1,8 +1,8 @@
-//! Search for one contact on a plane: coarse over the whitened table, then by Levenberg's steps.
+//! Search for one contact on a plane: coarse search, then Levenberg–Marquardt steps.
 //!
-//! Symbols: d whitened reading (less offsets, over the noise), f whitened influence, W force, (x, y) position,
-//! e = d − W·f the residual, w weights 1/(1 + v) with v the calibration's variance of a reading over the noise's,
-//! χ²(x, y, W) = Σ w·e² (+ the force's own misfit where it is believed to be near a value).
+//! Symbols: d whitened reading (minus offsets, over the noise), f whitened influence, W force, (x, y)
+//! position, e = d − W·f, w = 1/(1 + v) with v the calibration's variance over the noise's,
+//! χ²(x, y, W) = Σ w·e² (+ the term of a normal prior of the force).
 
 use super::coarse::{Coarse, MOST_VALLEYS, Profile};
 use super::edges::Edges;
@@ -16,78 +16,66 @@ use crate::status::{StatusRule, unknowns};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_numerics::small::{Matrix, add_outer};
 
-/// A table that is ready to be searched: whitened, and without the channels that are left out.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Search {
-    /// The channels in use.
     pub live: Vec<usize>,
     offsets: Vec<f64>,
     inverse_sd: Vec<f64>,
     pub patches: Patches,
-    /// Variance of f at every node, in groups of eight channels.
+    /// Variance of f by node and group.
     variances: Vec<Lanes>,
-    /// 1/(1 + v) at every node, for the known force or the calibration's, in groups of eight channels.
+    /// 1/(1 + v) by node and group, at `weights_force_n`.
     weights: Vec<Lanes>,
-    /// Σ ln(1 + v) at every node.
+    /// Σ ln(1 + v).
     spreads: Vec<f64>,
-    /// The least weight in the middle of every coarse cell.
     least_weights: Vec<f64>,
-    /// The force of these weights, in newtons.
     weights_force_n: f64,
     pub coarse: Coarse,
-    /// Distances of contacts from the edges, where their force is not known.
+    /// Only for an unknown force.
     pub edges: Edges,
     pub force: ForceBelief,
-    /// Greatest force of a contact, in newtons; infinite where more is known of the force than that.
+    /// Infinite unless the force is unknown.
     pub greatest_force_n: f64,
-    /// Length and width, in metres.
     pub size_m: [f64; 2],
     pub rule: StatusRule,
 }
 
-/// A minimum of the misfit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Minimum {
     pub at: Unknowns,
-    /// χ² there.
     pub misfit: f64,
-    /// JᵀwJ there, J the derivatives of W·f by x, y and W.
+    /// JᵀwJ, J the derivatives of W·f by x, y and W.
     pub information: Matrix<3>,
 }
 
-/// A place with the best force there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Profiled {
     pub force_n: f64,
-    /// χ² with it.
     pub misfit: f64,
-    /// The force that would be best if contacts could pull, and press with any force.
+    /// Best force without bounds.
     free_n: f64,
-    /// 1/variance of the force; infinite where it is known.
+    /// 1/variance of the force; infinite for a known force.
     precision: f64,
 }
 
 impl Profiled {
-    /// Standard deviation of the force at this place.
     pub fn sd_n(&self) -> f64 {
         self.precision.sqrt().recip()
     }
 
-    /// χ² with another force.
     pub fn misfit_with(&self, force_n: f64) -> f64 {
         let square = |force_n: f64| (force_n - self.free_n).powi(2);
         self.misfit + self.precision * (square(force_n) - square(self.force_n))
     }
 }
 
-/// A channel so many standard deviations off is nothing that a contact does.
+/// Greatest whitened value, beyond any contact.
 const LOUDEST: f64 = 1e15;
 
-/// A minimum this much above the best has a share of e⁻¹² of the probability.
+/// A minimum this far above the best has e⁻¹² of its probability.
 const NEGLIGIBLE: f64 = 24.0;
 
 impl Search {
-    /// Whitens a table by the noise of each channel, and leaves out the channels that are `dead`.
     pub fn new(table: &PlaneTable, channels: &Channels, force: ForceBelief) -> Self {
         let Channels { offsets, noise_sd, reference_force_n, false_alarm_rate, .. } = channels;
         let live = channels.live();
@@ -106,7 +94,7 @@ impl Search {
         let greatest_force_n =
             if force == ForceBelief::Unknown { channels.greatest_force_n() } else { f64::INFINITY };
         let coarse = Coarse::new(table, &patches, live.len(), force);
-        // Channels that only fill a group up have v = 0, and a weight of 1.
+        // Padding channels have v = 0 and weight 1.
         let node = |node: usize| weights[node * patches.groups..][..patches.groups].as_flattened().iter();
         let spreads = (0..table.nodes()).map(|n| node(n).map(|w| -w.ln()).sum()).collect();
         let least = |cell: usize| {
@@ -143,7 +131,7 @@ impl Search {
         }
     }
 
-    /// Writes d over `whitened`, and returns |d|²; of a reading that is absurdly loud, at the loudness whose squares are still numbers.
+    /// Writes d and returns |d|²; extreme readings are scaled down.
     pub fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>) -> f64 {
         whitened.clear();
         let channels = self.live.iter().zip(&self.offsets).zip(&self.inverse_sd);
@@ -157,7 +145,7 @@ impl Search {
         whitened.iter().map(|d| d * d).sum()
     }
 
-    /// The minima that matter, best first, of a reading that was whitened to length `square`.
+    /// Relevant minima, best first; `square` is |d|².
     pub fn minima(
         &self,
         square: f64,
@@ -188,14 +176,13 @@ impl Search {
         (found, found[..kept].iter().take_while(matters).count().max(1))
     }
 
-    /// True where a point explains a reading: its least misfit is one of noise, and by one minimum at least it is not spread.
     pub fn is_explained(&self, misfit: f64, minima: &[Minimum], whitened: &[f64]) -> bool {
         self.rule.is_explained(misfit) && minima.iter().any(|minimum| !self.is_spread(whitened, minimum))
     }
 
-    /// True for a reading that is, by its minimum, one of a contact that is spread.
+    /// Distributed-contact test.
     fn is_spread(&self, whitened: &[f64], Minimum { at, misfit, .. }: &Minimum) -> bool {
-        // The square of the residual is at least that of its part.
+        // χ² is at least as large as the score.
         if *misfit <= spread_bound(2) {
             return false;
         }
@@ -215,14 +202,14 @@ impl Search {
         spread_score(about, reading, reads) > spread_bound(2)
     }
 
-    /// About the least misfit in a coarse cell, of which the profile holds that without weights.
+    /// Approximate lower bound of χ² in a coarse cell.
     pub fn floor(&self, profile: &Profile, cell: usize) -> f64 {
         let reach = profile.force_n(cell, self.force) * self.coarse.reaches[cell];
         let closest = (profile.misfits()[cell].max(0.0).sqrt() - reach).max(0.0);
         self.least_weights[cell] * closest * closest
     }
 
-    /// Whether two minima lie in one valley: on the straight way between them the misfit hardly rises.
+    /// True where χ² rises by at most 1 on the line between both.
     fn same(&self, whitened: &[f64], a: &Minimum, b: &Minimum) -> bool {
         const STEPS: usize = 8;
         const RISE: f64 = 1.0;
@@ -236,7 +223,6 @@ impl Search {
             })
     }
 
-    /// A place with the best force there.
     #[inline]
     pub fn profiled(&self, whitened: &[f64], [x_m, y_m]: [f64; 2]) -> Profiled {
         let place = self.patches.place(x_m, y_m);
@@ -266,30 +252,28 @@ impl Search {
         Profiled { force_n, misfit, free_n, precision: norm }
     }
 
-    /// Σ ln(1 + v) at a place, by which a reading is less likely where the calibration tells less.
+    /// Σ ln(1 + v), a term of −2·ln of the likelihood.
     pub fn spread(&self, [x_m, y_m]: [f64; 2]) -> f64 {
         self.spreads[self.patches.nearest(x_m, y_m)]
     }
 
-    /// The best force at a place.
     pub fn best_force(&self, whitened: &[f64], at: [f64; 2]) -> f64 {
         self.force.known_n().unwrap_or_else(|| self.profiled(whitened, at).force_n)
     }
 
-    /// The groups of the node nearest to a place.
     #[inline]
     fn nearest_groups<'a>(&self, groups: &'a [Lanes], [x_m, y_m]: [f64; 2]) -> &'a [Lanes] {
         &groups[self.patches.nearest(x_m, y_m) * self.patches.groups..][..self.patches.groups]
     }
 
-    /// Σ (W·f)² at a contact.
+    /// Σ (W·f)².
     pub fn signal(&self, contact: Contact) -> f64 {
         let place = self.patches.place(contact.position.x_m, contact.position.y_m);
         let squares = (0..self.patches.groups).flat_map(|group| self.patches.value(&place, group));
         contact.force_n.powi(2) * squares.map(|f| f * f).sum::<f64>()
     }
 
-    /// f, its gradient and W²·v of every channel at a contact.
+    /// f, gradient and W²·v of every channel.
     pub fn linearised(&self, contact: Contact) -> impl Iterator<Item = [f64; 4]> {
         let Contact { position: Position { x_m, y_m }, force_n } = contact;
         let place = self.patches.place(x_m, y_m);
@@ -303,7 +287,7 @@ impl Search {
         })
     }
 
-    /// Σ w·j·jᵀ and Σ w²·v·j·jᵀ at a contact, j the derivatives of W·f by x, y and W.
+    /// Σ w·j·jᵀ and Σ w²·v·j·jᵀ.
     pub fn calibration(&self, contact: Contact) -> [Matrix<3>; 2] {
         let Contact { position: Position { x_m, y_m }, force_n } = contact;
         let place = self.patches.place(x_m, y_m);
@@ -324,7 +308,7 @@ impl Search {
         sums
     }
 
-    /// The normal equations; the calibration's variances are those `near` some place, or where the contact is.
+    /// Normal equations with the calibration's variances `near` a place, by default at the contact.
     pub fn equations(&self, whitened: &[f64], at: Unknowns, near: Option<[f64; 2]>) -> Equations {
         let [x_m, y_m, force_n] = at;
         let place = self.patches.place(x_m, y_m);
@@ -355,16 +339,15 @@ impl Search {
 
 const NOWHERE: Minimum = Minimum { at: [0.0; 3], misfit: f64::INFINITY, information: [[0.0; 3]; 3] };
 
-/// A step that lowers the misfit by less than this, a fiftieth of a standard deviation, is the last one.
+/// Least decrease of χ² per step: a fiftieth of a standard deviation, squared.
 const SMALL: f64 = 4e-4;
 
 impl Search {
-    /// The minimum near a place.
     pub fn refine(&self, whitened: &[f64], start_m: [f64; 2]) -> Minimum {
         let start = [start_m[0], start_m[1], self.best_force(whitened, start_m)];
         let force = self.force.known_n().map_or((0.0, self.greatest_force_n), |force_n| (force_n, force_n));
         let ends = [(0.0, self.size_m[0]), (0.0, self.size_m[1]), force];
-        // Within one refinement the calibration's variances stay, so that misfits can be compared.
+        // Constant variances within one refinement make χ² comparable.
         let (at, _) = descend(start, ends, SMALL, |at| self.equations(whitened, at, Some(start_m)));
         let Equations { misfit, information, .. } = self.equations(whitened, at, None);
         Minimum { at, misfit, information }

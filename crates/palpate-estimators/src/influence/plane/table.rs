@@ -1,45 +1,41 @@
-//! Influence functions on a plane, as a table over a grid with bicubic patches between its nodes.
+//! Table of influence functions on a plane, with bicubic Hermite interpolation.
 //!
-//! A patch is the tensor product of two cubic Hermite polynomials: it takes value, both derivatives and the mixed
-//! derivative at its four corners, and joins its neighbours with a continuous gradient. The derivatives at the nodes are
-//! differences of fourth order of the table's values, so that a table holds nothing but values (Abramowitz and Stegun,
-//! table 25.2, five points; one-sided at the edges).
+//! Derivatives at the nodes are fourth-order differences (Abramowitz and Stegun, table 25.2, five points;
+//! one-sided at the edges).
 
 use crate::influence::lanes::Lanes;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use serde::{Deserialize, Serialize};
 
-/// Reading of every sensor per newton, with its uncertainty, at the nodes of a grid over a rectangle.
+/// Influence functions of all sensors at the nodes of a grid over a rectangle.
 ///
-/// Between nodes the functions are bicubic (see `Patches`). Node (column, row) is number row·columns + column, and within a
-/// node the numbers are stored sensor by sensor.
+/// Node (column, row) has the index row·columns + column; values are stored by node, then by sensor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlaneTable {
-    /// Sensors S.
+    /// Number of sensors S.
     pub sensors: usize,
-    /// Length of the rectangle in metres; column i is at i·length/(columns − 1).
+    /// Length in metres; column i is at i·length/(columns − 1).
     pub length_m: f64,
-    /// Its width in metres; row j is at j·width/(rows − 1).
+    /// Width in metres; row j is at j·width/(rows − 1).
     pub width_m: f64,
     /// Nodes along the length; odd, at least [`PlaneTable::LEAST_SIDE`].
     pub columns: usize,
     /// Nodes across the width; odd, at least [`PlaneTable::LEAST_SIDE`].
     pub rows: usize,
-    /// Reading per newton, in the sensors' SI units, nodes × S.
+    /// Reading per newton, in SI units, nodes × S.
     pub values: Vec<f64>,
-    /// Variance of the values, from calibrating with finitely many noisy presses, nodes × S.
+    /// Posterior variance of the values, nodes × S.
     pub variances: Vec<f64>,
 }
 
 impl PlaneTable {
-    /// The fewest nodes along a side: differences of fourth order take five.
+    /// Fewest nodes along a side; fourth-order differences need five.
     pub const LEAST_SIDE: usize = 9;
-    /// About how many nodes there are: on a square 49 × 49, a fiftieth of a side apart.
+    /// Approximate number of nodes; 49 × 49 on a square.
     const NODES: f64 = 2401.0;
 
-    /// A table of zeros over a surface; nodes are about as far apart along as across.
     pub(super) fn empty(sensors: usize, extent: Extent) -> Self {
         let (length_m, width_m) = (extent.length_m(), extent.width_m().unwrap_or(extent.length_m()));
         let side = |ratio: f64| {
@@ -51,62 +47,56 @@ impl PlaneTable {
         Self { sensors, length_m, width_m, columns, rows, values: zeros.clone(), variances: zeros }
     }
 
-    /// Places of a contact that are distinguished on a plane of this extent: the cells of the coarse search.
     pub(crate) fn places(extent: Extent) -> usize {
         let Self { columns, rows, .. } = Self::empty(0, extent);
         (columns - 1) / 2 * ((rows - 1) / 2)
     }
 
-    /// Nodes of a table over a surface of this extent.
     pub(crate) fn nodes_over(extent: Extent) -> usize {
         Self::empty(0, extent).nodes()
     }
 
-    /// Number of nodes.
+    /// Returns the number of nodes.
     pub fn nodes(&self) -> usize {
         self.columns * self.rows
     }
 
-    /// Distance of neighbouring nodes along and across, in metres.
+    /// Returns the distance of neighbouring nodes along and across, in metres.
     pub fn spacing_m(&self) -> [f64; 2] {
         [self.length_m / (self.columns - 1) as f64, self.width_m / (self.rows - 1) as f64]
     }
 
-    /// Position of a node.
+    /// Returns the position of a node.
     pub fn node(&self, node: usize) -> Position {
         let [along_m, across_m] = self.spacing_m();
         let (column, row) = (node % self.columns, node / self.columns);
         Position { x_m: column as f64 * along_m, y_m: row as f64 * across_m }
     }
 
-    /// The value of every node for one sensor.
     pub(super) fn of_sensor(&self, sensor: usize) -> impl Iterator<Item = f64> + '_ {
         self.values.iter().skip(sensor).step_by(self.sensors).copied()
     }
 }
 
-/// The patches of some sensors, in groups of eight, filled up with zeros.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Patches {
     columns: usize,
     rows: usize,
     inverse_spacing: [f64; 2],
     pub groups: usize,
-    /// For each node and group: f, and the derivatives by column, by row and by both.
+    /// f and derivatives by column, row and both.
     nodes: Vec<[Lanes; 4]>,
 }
 
-/// A place within a patch, and the weights of its corners.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PatchPoint {
-    /// The corner at the lower left.
+    /// Lower left corner.
     node: usize,
-    /// Weights along: of value left and right, of derivative left and right; then those of the function's derivative.
+    /// Weights of f and of the derivative: left and right value, left and right slope.
     along: [[f64; 4]; 2],
     across: [[f64; 4]; 2],
 }
 
-/// f and its derivatives along and across, of eight sensors.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Values {
     pub f: Lanes,
@@ -115,7 +105,6 @@ pub(super) struct Values {
 }
 
 impl Patches {
-    /// Patches of the sensors `live` of a table, each multiplied by its factor.
     pub fn new(table: &PlaneTable, live: &[usize], factors: &[f64]) -> Self {
         let groups = live.len().div_ceil(8);
         let mut nodes = vec![[[0.0; 8]; 4]; table.nodes() * groups];
@@ -135,7 +124,7 @@ impl Patches {
         Self { columns: table.columns, rows: table.rows, inverse_spacing, groups, nodes }
     }
 
-    /// The patch that holds a place, which is held to the surface.
+    /// Patch of a place, clamped to the surface.
     #[inline]
     pub fn place(&self, x_m: f64, y_m: f64) -> PatchPoint {
         let (column, along) = hermite(x_m * self.inverse_spacing[0], self.columns);
@@ -143,7 +132,6 @@ impl Patches {
         PatchPoint { node: row * self.columns + column, along, across }
     }
 
-    /// f and its gradient at a place, of the sensors of a group.
     #[inline]
     pub fn values(&self, place: &PatchPoint, group: usize) -> Values {
         let PatchPoint { node, along: [u, du], across: [v, dv] } = place;
@@ -152,7 +140,7 @@ impl Patches {
             let (right, up) = (side % 2, side / 2);
             let corner = &self.nodes[(node + right + up * self.columns) * self.groups + group];
             for (kind, lanes) in corner.iter().enumerate() {
-                // The derivative by column goes with the derivative's weight along, and so on.
+                // Derivatives by column pair with the slope weights along, and so on.
                 let (i, j) = (right + 2 * (kind % 2), up + 2 * (kind / 2));
                 let (f, along, across) = (u[i] * v[j], du[i] * v[j], u[i] * dv[j]);
                 for (lane, value) in lanes.iter().enumerate() {
@@ -169,7 +157,6 @@ impl Patches {
         values
     }
 
-    /// f alone at a place, of the sensors of a group.
     #[inline]
     pub fn value(&self, place: &PatchPoint, group: usize) -> Lanes {
         let PatchPoint { node, along: [u, _], across: [v, _] } = place;
@@ -187,12 +174,10 @@ impl Patches {
         value
     }
 
-    /// f of a group at a node.
     pub fn at_node(&self, column: usize, row: usize, group: usize) -> &Lanes {
         &self.nodes[(row * self.columns + column) * self.groups + group][0]
     }
 
-    /// The node nearest to a place.
     #[inline]
     pub fn nearest(&self, x_m: f64, y_m: f64) -> usize {
         let near = |at: f64, count: usize| (at.round().max(0.0) as usize).min(count - 1);
@@ -204,8 +189,7 @@ impl Patches {
     }
 }
 
-/// The cell of a coordinate, in nodes, and the weights of value before and behind and of derivative before and behind; of
-/// the function and of its derivative.
+/// Cell, and Hermite weights of the function and of the derivative.
 #[inline]
 fn hermite(place: f64, count: usize) -> (usize, [[f64; 4]; 2]) {
     let place = place.clamp(0.0, (count - 1) as f64);
@@ -217,7 +201,7 @@ fn hermite(place: f64, count: usize) -> (usize, [[f64; 4]; 2]) {
     (cell, [value, [-bump, bump, 3.0 * t2 - 4.0 * t + 1.0, 3.0 * t2 - 2.0 * t]])
 }
 
-/// Derivatives per node along lines of `count` numbers that lie `step` apart; there are `lines` of them, `pitch` apart.
+/// Derivatives per node along `lines` lines (`pitch` apart) of `count` values (`step` apart).
 fn differences(values: &[f64], count: usize, lines: usize, step: usize, pitch: usize) -> Vec<f64> {
     const INNER: [f64; 5] = [1.0, -8.0, 0.0, 8.0, -1.0];
     const SECOND: [f64; 5] = [-3.0, -10.0, 18.0, -6.0, 1.0];
@@ -248,7 +232,6 @@ mod tests {
     use super::*;
     use palpate_mechanics::surface::Extent;
 
-    /// A polynomial of third degree in each direction.
     fn cubic(x: f64, y: f64) -> f64 {
         (x * x * x - 0.3 * x + 0.1) * (2.0 * y * y * y + y * y - 0.2)
     }

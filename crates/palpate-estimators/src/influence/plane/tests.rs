@@ -1,4 +1,4 @@
-//! The estimator on the plate of `examples/plate.toml`, against the limit.
+//! The estimator on the plate of `examples/plate.toml`, relative to the Cramér–Rao bound.
 
 use super::*;
 use crate::arrangement::cells;
@@ -39,8 +39,7 @@ fn sensors(setup: &Setup) -> CleanSensors<'_> {
     CleanSensors::new(setup.surface().model().unwrap(), setup.layout())
 }
 
-/// The middles of `side` × `side` cells of the inner 90 % of the area: the rectangle about the same centre with sides √0.9
-/// times as long.
+/// Middles of `side` × `side` cells of the concentric rectangle with 90 % of the area.
 fn inner_positions(extent: Extent, side: usize) -> Vec<Position> {
     let share = 0.9f64.sqrt();
     let width_m = extent.width_m().unwrap();
@@ -51,17 +50,16 @@ fn inner_positions(extent: Extent, side: usize) -> Vec<Position> {
     cells(inner, side, side).into_iter().map(moved).collect()
 }
 
-/// Calibrations that are tried, and cells a side of the inner 90 % in whose middles the plate is touched.
+/// Calibrations, and cells per side of the inner 90 %.
 const CALIBRATIONS: u64 = 1;
 const SIDE: usize = 16;
 
-/// Locators from [`CALIBRATIONS`] calibrations with 5 N.
 fn calibrated(rig: &Example, source: InfluenceSource) -> Vec<PlaneLocator> {
     let config = Influence { source, ..Influence::default() };
     (0..CALIBRATIONS).map(|seed| fit(config, &rig.setup, &rig.simulate(seed))).collect()
 }
 
-/// The same locator, to which nothing is known of the force.
+/// Replaces the known force by an unknown one.
 fn without_force(locator: &PlaneLocator) -> PlaneLocator {
     let json = serde_json::to_string(locator).unwrap().replace("{\"known\":5.0}", "\"unknown\"");
     let changed: PlaneLocator = serde_json::from_str(&json).unwrap();
@@ -69,17 +67,16 @@ fn without_force(locator: &PlaneLocator) -> PlaneLocator {
     changed
 }
 
-/// One located touch.
 #[derive(Clone, Copy, Debug)]
 struct Touch {
     error_m: f64,
-    /// The limit: standard deviation, and mean error.
+    /// Cramér–Rao bound: standard deviation, and mean error.
     limit_m: [f64; 2],
-    /// Whether the 95 % ellipse holds the contact; `None` where the locator says that nothing touches.
+    /// Coverage by the 95 % ellipse; `None` without detection.
     is_covered: Option<bool>,
 }
 
-/// Touches of 5 N all over the inner 90 % of the plate.
+/// Contacts of 5 N over the inner 90 % of the plate.
 fn touches(rig: &Example, locators: &[PlaneLocator], force: Force) -> Vec<Touch> {
     let limit = rig.setup.cramer_rao_bound().unwrap();
     let (clean, errors) = (sensors(&rig.setup), ChannelErrors::none(rig.setup.layout()));
@@ -105,7 +102,7 @@ fn touches(rig: &Example, locators: &[PlaneLocator], force: Force) -> Vec<Touch>
     touches
 }
 
-/// Mean error over that of the limit, and share of covered contacts, of touches whose limit is within `range_mm`.
+/// Mean error relative to the limit, and coverage, of contacts with a limit in `range_mm`.
 fn summed(touches: &[Touch], range_mm: std::ops::Range<f64>) -> (f64, f64) {
     let inside = || touches.iter().filter(|touch| range_mm.contains(&(touch.limit_m[0] * 1e3)));
     let (error_m, limit_m) = (
@@ -129,19 +126,20 @@ fn the_plate_is_located_at_the_limit_and_ellipses_hold_what_they_say() {
         let unknown: Vec<PlaneLocator> = known.iter().map(without_force).collect();
         for (force, locators) in [(Force::Known, known), (Force::Unknown, unknown)] {
             let touches = touches(&rig, &locators, force);
-            // Where an unbiased estimator can be off by more than the plate, the limit is far above any error, so that the
-            // ratio is asserted where the limit is a bound, too: there it is 1.05 to 1.15 in the experiment, and the mean of a hundred errors
+            // Where the limit exceeds the plate, errors are far below it. The ratio is therefore also
+            // asserted for limits below 10 mm: 1.05 to 1.15 in the experiment. The mean of a hundred errors
             // has a standard deviation of 6 %.
             let (everywhere, covered) = summed(&touches, 0.0..f64::INFINITY);
             let (where_it_binds, _) = summed(&touches, 0.0..10.0);
             assert!(everywhere <= 1.2 && where_it_binds <= 1.35, "{source:?}, {force:?}: {where_it_binds}");
-            // Four standard deviations of 256 touches below the 92 % of influence functions from the recording.
+            // Four standard deviations of 256 contacts below the 92 % of influence functions from the
+            // recording.
             assert!(covered >= 0.85, "{source:?}, {force:?}: {covered}");
         }
     }
 }
 
-/// Readings of contacts (x, y in mm and newtons) with the bench's noise.
+/// Readings of contacts (mm, mm, N) with the bench's noise.
 fn noisy(
     setup: &Setup,
     clean: &CleanSensors,
@@ -181,7 +179,7 @@ fn no_contact_and_two_contacts_are_no_single_contact() {
             assert_eq!(one.status, Status::Located);
             assert!((one.contact.force_n.unwrap() - 5.0).abs() < 0.5, "{force_n:?}: {one:?}");
         }
-        // One in a thousand readings of noise: of fifty more than one in a thousand tests.
+        // At a false-alarm rate of 0.001, more than one of fifty occurs in one of a thousand tests.
         assert!(false_alarms <= 1, "{force_n:?}: {false_alarms} of 50");
     }
 }

@@ -1,4 +1,4 @@
-//! A batch against readings one by one, and every instruction set against plain arrays.
+//! Batches equal single readings, and all instruction sets equal portable arrays.
 
 use super::{fit, noisy};
 use crate::fit::Locate;
@@ -14,7 +14,8 @@ use palpate_numerics::simd::InstructionSet;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Readings of every kind: nothing, one contact all along the beam and at its very ends, weak ones, and two at once.
+/// Readings without contact, with one contact along the beam and at the ends, with weak contacts, and with
+/// two.
 fn readings(setup: &Setup) -> Vec<Vec<f64>> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
     let mut readings = Vec::new();
@@ -33,7 +34,7 @@ fn readings(setup: &Setup) -> Vec<Vec<f64>> {
     readings
 }
 
-/// The paper's bench with what is known of the force, and up to how many contacts.
+/// The paper's bench with several priors of the force and numbers of contacts.
 fn benches() -> Vec<(Setup, Influence)> {
     let setup = paper(5e-6, 10).setup;
     let unknown = setup.clone().unknown_force();
@@ -54,7 +55,7 @@ fn a_batch_answers_as_readings_one_by_one_do() {
         let locator = fit(config, &setup, &recording);
         let readings = readings(&setup);
         let single: Vec<Estimate> = readings.iter().map(|reading| locator.locate(reading)).collect();
-        // Twice, the second time over estimates of other readings.
+        // The second pass overwrites estimates of other readings.
         let mut estimates = vec![NO_CONTACT; readings.len()];
         let mut scratch = Scratch::default();
         for order in [readings.iter().rev().flatten().copied().collect::<Vec<f64>>(), readings.concat()] {

@@ -1,4 +1,4 @@
-//! Strain bridges with offsets far above their signal, and rows in which nothing touched.
+//! Strain bridges with offsets far above their signal, and untouched rows.
 
 use super::*;
 use crate::fit::{Fit, Fitted};
@@ -9,12 +9,12 @@ use palpate_mechanics::sensing::SensorKind::Strain;
 use palpate_mechanics::units::microstrain;
 use rand::RngExt;
 
-/// The paper's beam under eight strain gauges; its force is not known.
+/// The paper's beam with eight strain gauges and an unknown force.
 fn setup() -> Setup {
     Setup::new(crate::fixtures::beam()).sensors(Strain.evenly(8).noise(microstrain(1.0))).unwrap()
 }
 
-/// Readings of gauges with offsets of up to so many microstrain.
+/// Gauges with offsets of up to `offset` microstrain.
 struct Bridges {
     setup: Setup,
     offsets: Vec<f64>,
@@ -42,7 +42,7 @@ impl Bridges {
         Row { position, force_n: Some(force_n), nuisances: Vec::new(), time_s: None, reading }
     }
 
-    /// Presses of 3 N at ten places, three times each, after so many untouched rows.
+    /// Three rows of 3 N at each of ten places, after `untouched` rows.
     fn recording(&mut self, untouched: usize) -> Recording {
         let presses: Vec<Row> = (0..30).map(|i| self.row(0.04 * (f64::from(i % 10) + 0.5), 3.0)).collect();
         let mut rows: Vec<Row> = (0..untouched).map(|_| self.row(0.0, 0.0)).collect();
@@ -50,7 +50,7 @@ impl Bridges {
         Recording::new(self.setup.layout(), "bridges", rows)
     }
 
-    /// Mean error in mm of touches of 1 N to 6 N, and the share that is in its interval.
+    /// Mean error in mm and coverage of contacts of 1 N to 6 N.
     fn judged(&mut self, locator: &Fitted<InfluenceLocator>) -> [f64; 2] {
         const TOUCHES: usize = 200;
         let (mut error_mm, mut held) = (0.0, 0);
@@ -78,7 +78,7 @@ fn offsets_of_bridges_are_those_of_the_untouched_rows() {
         let [[without_mm, _], ..] = found;
         for [error_mm, held] in found {
             assert!((error_mm / without_mm - 1.0).abs() < 1e-3, "{source:?}: {found:?}");
-            // A spline through ten places bends more than its variances say.
+            // A spline through ten places bends more than its variances allow.
             let least_held = if source == InfluenceSource::Recording { 0.8 } else { 0.9 };
             assert!(held >= least_held, "{source:?}: {found:?}");
         }
@@ -102,7 +102,7 @@ fn noise_is_told_by_the_untouched_rows() {
     let mut bridges = Bridges::new(0.0);
     bridges.setup = bridges.setup.with_noise("3 ue".parse().unwrap()).unwrap();
     let recording = bridges.recording(300);
-    // The rig says a third of it.
+    // The rig states a third of it.
     let setup = setup();
     let locator = Influence::default().fit_beam(FitTask::new(&setup, &recording)).unwrap();
     for noise in locator.influences().flatten().map(|(.., noise)| noise) {

@@ -1,4 +1,4 @@
-//! The search against an exhaustive one: readings of every odd kind, and the misfit at two thousand places.
+//! Comparison with an exhaustive search over two thousand places.
 
 use super::{clean, fit, noisy};
 use crate::fixtures::paper;
@@ -12,16 +12,15 @@ use palpate_numerics::simd::Array;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Places in a cell of the table.
+/// Places per cell of the table.
 const PARTS: usize = 16;
 
-/// Kinds of readings that are mostly noise.
+/// Readings that are mostly noise.
 const ROUGH: [&str; 2] = ["rough", "all noise"];
 
-/// A kind of reading, and one of it.
 type Odd = (&'static str, Vec<f64>);
 
-/// Readings that one contact does not explain, or hardly.
+/// Readings at or beyond the limits of a single contact.
 fn odd_readings(setup: &Setup, rng: &mut Xoshiro256PlusPlus) -> Vec<Odd> {
     let mut place = |low: f64, high: f64| rng.random_range(low..high);
     let contacts = [
@@ -45,8 +44,8 @@ fn odd_readings(setup: &Setup, rng: &mut Xoshiro256PlusPlus) -> Vec<Odd> {
     readings
 }
 
-/// −2 ln of a contact's likelihood, but for a constant: χ² with the calibration's variance at its force, and what that
-/// variance costs. Where the force is neither known nor given, the best.
+/// −2·ln of the likelihood without its constant, with the calibration's variance at the force; `None` means
+/// the best force.
 fn cost(search: &Search, whitened: &[f64], x_m: f64, force_n: Option<f64>) -> f64 {
     let (table, reference_n) = (&search.table, search.gauss_newton.variance_scale(0.0).sqrt());
     let cell = table.cell(x_m);
@@ -75,7 +74,7 @@ fn cost(search: &Search, whitened: &[f64], x_m: f64, force_n: Option<f64>) -> f6
     at(force).0 + precision * (force - mean).powi(2)
 }
 
-/// The lowest misfit on the surface and where it is.
+/// Lowest cost on the line and its place.
 fn exhaustive(search: &Search, whitened: &[f64]) -> (f64, f64) {
     let places = (InfluenceTable::NODES - 1) * PARTS;
     let place_m = |i: usize| search.table.length_m * i as f64 / places as f64;
@@ -83,7 +82,7 @@ fn exhaustive(search: &Search, whitened: &[f64]) -> (f64, f64) {
     costs.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap()
 }
 
-/// What the search finds, and the whitened reading.
+/// Minimum of the search, and the whitened reading.
 fn found(search: &Search, reading: &[f64]) -> (Minimum, Vec<f64>) {
     let mut scratch = Scratch::default();
     let square = search.whiten::<Array<f64, 8, false>>(reading, scratch.whitened.room(search.groups()));
@@ -105,8 +104,8 @@ fn the_lowest_misfit_is_found_in_odd_readings() {
             let search = locator.search();
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(17);
             for (kind, reading) in (0..8).flat_map(|_| odd_readings(&setup, &mut rng)) {
-                // Noise as large as a signal is best explained by an immense force next to a support, where the
-                // calibration says least; the search looks where the noise alone says.
+                // An immense force next to a support, where the calibration is most uncertain, best explains
+                // such noise; the search uses χ² of the noise alone.
                 if !matches!(search.force, ForceBelief::Known(_)) && ROUGH.contains(&kind) {
                     continue;
                 }
