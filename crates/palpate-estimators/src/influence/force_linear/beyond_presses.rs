@@ -1,12 +1,13 @@
-//! Intervals of contacts beyond the outermost presses.
+//! Intervals of contacts beyond the outermost calibrated positions.
 //!
-//! The influences are extrapolated there, and how surely depends on sensors that may be there, of which presses tell nothing. An interval of the place that
-//! reaches beyond the outermost press reaches the end of the surface: nothing there is excluded. Where the force is not known, it and the place trade off,
-//! and the force's interval holds every force as well. On a plane the interval of 99 % says whether one reaches there.
+//! The influence functions are extrapolated there, and unknown sensors may lie there. An interval of the
+//! position that reaches beyond the outermost position extends to the edge of the surface. With an unknown
+//! force (force–position trade-off), the interval of the force then contains all forces. On a plane the 99 %
+//! interval decides.
 //!
-//! On a line intervals are by the likelihood ratio ([`crate::trade_off`]), in which one channel may be anything: by the posterior, contacts beside the end would be
-//! excluded by the prior. Where the force is known, a contact beyond the grid of places may be explained best at either
-//! end of it: an interval that reaches an end of the grid before that of the surface is the whole surface.
+//! On a line the intervals are by the likelihood ratio ([`crate::trade_off`]), which admits one outlying
+//! channel; the prior of the posterior would exclude contacts near the end. With a known force, either end of
+//! the grid may explain a contact beyond it best: an interval that reaches such an end is the whole surface.
 
 use super::locator::{ForceLinearLocator, Stored};
 use crate::influence::grid::Axis;
@@ -17,7 +18,7 @@ use palpate_numerics::{NORMAL_95, NORMAL_99, holding, hull, normal_interval_95};
 use std::cell::RefCell;
 
 impl ForceLinearLocator {
-    /// Writes the intervals of a relative reading over those of the posterior where they reach beyond the outermost presses.
+    /// Extends intervals that reach beyond the outermost calibrated positions.
     pub(super) fn tell_beyond_presses(&self, relative: &[f64], estimate: &mut Estimate) {
         let [along, across] = self.axes();
         if across.count > 1 {
@@ -27,7 +28,8 @@ impl ForceLinearLocator {
         }
     }
 
-    /// Lets the intervals of a contact on a plane that would reach beyond the outermost presses with 99 % reach the edges.
+    /// Extends intervals on a plane to the edges where their 99 % interval reaches beyond the outermost
+    /// positions.
     fn open_edges(&self, estimate: &mut Estimate) {
         let ContactEstimate { position, uncertainty: Some(uncertainty), .. } = &mut estimate.contact else {
             return;
@@ -40,7 +42,7 @@ impl ForceLinearLocator {
             let (first_m, last_m) = self.outermost_m(k);
             let (low_m, high_m) = of_99(at_m, *interval_m);
             let (is_before, is_behind) = (low_m <= first_m, high_m >= last_m);
-            // The estimate is drawn too far towards an edge as often as too little: all that lies beyond is held.
+            // An extrapolated estimate errs to both sides: the interval includes the whole margin.
             if is_before {
                 *interval_m = hull(*interval_m, (0.0, first_m));
             }
@@ -54,7 +56,7 @@ impl ForceLinearLocator {
         }
     }
 
-    /// Writes the intervals of a relative reading over those of the posterior where that is near an end of a line.
+    /// Extends intervals on a line where a mode is near an end.
     fn tell_near_ends(&self, axis: Axis, relative: &[f64], estimate: &mut Estimate) {
         let modes = estimate.modes.as_slice().iter().map(|mode| mode.contact);
         let contacts: Vec<ContactEstimate> = std::iter::once(estimate.contact).chain(modes).collect();
@@ -76,7 +78,7 @@ impl ForceLinearLocator {
         }
     }
 
-    /// The contacts over the grid that a reading does not exclude, places from the first node on and φ for the force.
+    /// Returns the confidence region over the grid: positions from the first node, and φ for the force.
     fn not_excluded(&self, axis: Axis, relative: &[f64], minima_m: &[f64]) -> Option<NotExcluded> {
         let seen = RefCell::new(self.seen(relative));
         let channels = |along_m: f64, response_n: f64, channels: &mut Vec<[f64; 2]>| {
@@ -87,35 +89,34 @@ impl ForceLinearLocator {
             force: self.known_response_n().map_or(Force::AtMost(self.force_prior.ends_n().1), Force::Known),
             widening: CALIBRATED,
             reference_force_n: self.stored.mean_force_n,
-            // The likelihood of few presses is widened already.
+            // With few presses the likelihood is divided already.
             extrapolates: self.stored.channels_as_one == 1.0,
             channels: &channels,
         };
         contacts.not_excluded(minima_m)
     }
 
-    /// Coordinate k of the outermost presses; the ends of the grid in files that do not say them.
+    /// Coordinate k of the outermost calibrated positions; the grid's ends in files without them.
     fn outermost_m(&self, k: usize) -> (f64, f64) {
         let axis = self.axes()[k];
         let of_grid = || (axis.start, axis.start + length_m(axis));
         self.stored.outermost_m.get(k).copied().unwrap_or_else(of_grid)
     }
 
-    /// The hardest force that is looked for.
     fn hardest_n(&self) -> f64 {
         self.stored.prior.force_of_response(self.force_prior.ends_n().1, 0.0).0
     }
 
-    /// The intervals of place and force on the surface; none of a force that is known.
+    /// Intervals of position and force on the surface; no interval of a known force.
     fn on_surface(&self, axis: Axis, found: &NotExcluded) -> ((f64, f64), Option<(f64, f64)>) {
         let Stored { prior, .. } = &self.stored;
         let (_, hardest_n) = self.force_prior.ends_n();
-        /// Of the surface's length.
+        /// Fraction of the surface's length.
         const ROUNDING: f64 = 1e-9;
         let whole_m = (0.0, prior.extent.length_m());
         let rounding_m = ROUNDING * whole_m.1;
         let (first_m, last_m) = self.outermost_m(0);
-        // A stretch that is hardly probable follows from nothing else either.
+        // Improbable segments are ignored, as other modes are.
         let probable = || found.stretches.iter().filter(|stretch| stretch.probability >= OTHER_PLACE);
         let (low_m, high_m) = probable().map(|stretch| stretch.x_95_m).reduce(hull).unwrap_or(found.x_95_m);
         let behind_m = whole_m.1 - (axis.start + length_m(axis));
@@ -135,18 +136,17 @@ impl ForceLinearLocator {
     }
 }
 
-/// The interval of 99 % of an estimate with one of 95 %.
+/// Scales a 95 % interval about the estimate to 99 %.
 fn of_99(at_m: f64, (low_m, high_m): (f64, f64)) -> (f64, f64) {
     const TIMES: f64 = NORMAL_99 / NORMAL_95;
     (at_m - TIMES * (at_m - low_m), at_m + TIMES * (high_m - at_m))
 }
 
-/// Length of a grid along a line.
 fn length_m(axis: Axis) -> f64 {
     axis.step * (axis.count - 1) as f64
 }
 
-/// True for a contact that may be beyond the outermost presses.
+/// Returns whether a contact may lie beyond the outermost positions.
 fn is_near((first_m, last_m): (f64, f64), contact: &ContactEstimate) -> bool {
     /// Standard deviations.
     const NEAR: f64 = 5.0;

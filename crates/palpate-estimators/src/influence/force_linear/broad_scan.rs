@@ -1,17 +1,18 @@
-//! Costs of places, about, where the prior of the force is log-normal: forces reach over decades, and variances with them.
+//! Coarse search with a log-normal prior of the force.
 //!
-//! Variances grow with φ, so bounds by the variances of the hardest φ say little of light touches, and nothing of harder ones. The least-squares φ of a
-//! place hardly depends on the variances, however: with the variances of no force, where noise weighs the channels, and with those of the greatest,
-//! where the calibration does. The greater of the two φ gives the variances of the place.
+//! Forces then span decades, and variances grow with φ: bounds by the variances of the largest φ are loose
+//! for small φ. The least-squares φ of a node depends little on the variances. It is computed with those of φ
+//! = 0, where noise weights the channels, and of the largest φ, where the calibration does. The larger result
+//! gives the variances of the node.
 //!
-//! The prior's width is that of ln φ: beside it the likelihood of the signal-to-noise ratio z costs ln(1 + s²·z²).
+//! The prior's width is that of ln φ: a signal-to-noise ratio z adds the cost ln(1 + s²·z²).
 
 use crate::force_prior::LogNormalPrior;
 use crate::influence::inversion::CellBlocks;
 use crate::influence::lanes::{LANES, Lanes};
 use palpate_numerics::simd::Eight;
 
-/// Influences and variances of every place, in blocks of eight.
+/// Influences and variances of all nodes, in blocks of eight.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct BroadScan {
     prior: LogNormalPrior,
@@ -19,11 +20,11 @@ pub(super) struct BroadScan {
     channels: usize,
     /// Channel by channel.
     terms: Vec<Terms>,
-    /// The least of the determinant, −2·ln.
+    /// Lower bound of the log determinant: Σ ln of the least variances.
     constants: Vec<Lanes>,
 }
 
-/// A channel at a place: f, and the variances noise + ω + φ·(2·β + φ·v) of its readings.
+/// Channel at a node: influence f, and variance noise + ω + φ·(2·β + φ·v) of the reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ChannelAtPlace {
     pub f: f64,
@@ -32,12 +33,12 @@ pub(super) struct ChannelAtPlace {
     pub open: f64,
     pub beta: f64,
     pub v: f64,
-    /// The least variance for any φ.
+    /// Least variance over φ.
     pub least: f64,
 }
 
 impl ChannelAtPlace {
-    /// With greater variances: noise by one factor, those that the calibration leaves by another.
+    /// Scales the variances of noise and of calibration.
     pub fn scaled(self, noise: f64, calibration: f64) -> Self {
         Self {
             noise: noise * self.noise,
@@ -66,9 +67,9 @@ struct Sums<V> {
 }
 
 impl<V: Eight> Sums<V> {
-    /// φ of the least squares, from 0 to the greatest.
+    /// Least-squares φ, from 0 to `greatest`.
     ///
-    /// A closure in its place would not be compiled for the instructions of the caller.
+    /// Not a closure: closures are not compiled for the instructions of the caller.
     #[inline(always)]
     fn response(&self, greatest: V) -> V {
         (self.fd / self.ff).max(V::splat(0.0)).min(greatest)
@@ -105,7 +106,7 @@ impl BroadScan {
         Self { prior, places, channels, terms, constants }
     }
 
-    /// The sums of the places of a block, by the variances of these φ.
+    /// Sums of a block's nodes, with the variances of `response`.
     #[inline(always)] // Compiled for the instructions of its caller.
     fn sums<V: Eight>(&self, block: usize, reading: &[f64], response: V) -> Sums<V> {
         let zero = V::splat(0.0);
@@ -129,7 +130,7 @@ impl CellBlocks for BroadScan {
         self.places
     }
 
-    /// The least misfit and cost of each place of a block, about, and φ there.
+    /// Approximate least chi-squared, cost and φ of each node of a block.
     #[inline(always)]
     fn look<V: Eight>(&self, block: usize, reading: &[f64]) -> [V; 3] {
         let (_, greatest_n) = self.prior.ends_n();

@@ -1,16 +1,17 @@
-//! Few presses in place of many, such that every reading counts.
+//! Condensed presses: few presses with nearly the likelihood of many.
 //!
-//! Of all presses at one position under the responses φ_i, with weights w_i (rows over the variance of one), offset and influence depend on
-//! the sums of w, w·φ, w·φ², w·y and w·φ·y alone. Two presses at φ̄ ± sd(φ), each of half the weight, that lie on the line of least squares of y over φ, have the
-//! same sums: nothing is lost.
+//! Presses at one position, with responses φ_i and weights w_i (rows over variance), enter offset and
+//! influence through the sums of w, w·φ, w·φ², w·y and w·φ·y alone. Two presses at φ̄ ± sd(φ), each of half
+//! the weight and on the least-squares line of y over φ, have equal sums.
 //!
-//! With too many positions for that, neighbours share a cell. An estimate ô, f̂ from fewer cells, two presses each, takes off
-//! what the positions within a cell change, so that one press is left, at x̄, the mean of the positions by w·φ², and the root mean square
-//! φ_r. It reads
+//! With too many positions for that, neighbours share a cell. An estimate ô, f̂ from fewer cells, two presses
+//! each, corrects readings for the change of position within a cell. One press remains at x̄, the mean of the
+//! positions by w·φ², and the root mean square φ_r, with the reading
 //!
-//! y = ô + φ_r·(f̂(x̄) + Σ w·φ·(y − ô − φ·f̂(x)) / Σ w·φ²),
+//! y = ô + φ_r·(f̂(x̄) + Σ w·φ·(y − ô − φ·f̂(x)) / Σ w·φ²).
 //!
-//! and what the cells tell of the offset whatever the influence is a press without force that reads ô, of weight Σ w·(1 − φ̄²/φ_r²).
+//! A press without force that reads ô, of weight Σ w·(1 − φ̄²/φ_r²), carries the remaining information on the
+//! offset.
 
 use super::drift::END;
 use super::evidence::{ChannelFit, Evidence};
@@ -24,8 +25,8 @@ use palpate_numerics::watch::{Cancelled, Watch};
 use std::sync::Arc;
 
 impl Presses {
-    /// No more than about `most` presses that tell of a separable prior without drift what all of these tell; `fits` are the noise and
-    /// signal of their channels.
+    /// Returns about `most` presses equivalent to all under a separable prior without drift; `fits` are the
+    /// channels' noise and signal.
     pub fn condensed(
         &self,
         prior: &Prior,
@@ -33,7 +34,7 @@ impl Presses {
         most: usize,
         watch: Watch,
     ) -> Result<Self, MeasuredError> {
-        /// Estimates, each from the presses that the last one left.
+        /// Rounds of estimate and condensation.
         const ROUNDS: usize = 2;
         let all = All { presses: self, responses: prior.responses(self), prior };
         let (untouched, touched): (Vec<usize>, Vec<usize>) =
@@ -62,8 +63,8 @@ impl Presses {
         Ok(few)
     }
 
-    /// No more than `most` presses that tell of the offset in the course of time what all of these tell: neighbours in time share a cell, in which what an
-    /// estimate says that the position changes is taken off.
+    /// Returns at most about `most` presses equivalent for the offset over time. Neighbours in time share a
+    /// cell, corrected to a common position by `estimate`.
     pub fn condensed_in_time(
         &self,
         prior: &Prior,
@@ -91,8 +92,7 @@ impl Presses {
         self.means.push_row(reading.view()).expect("as many channels as all presses have");
     }
 
-    /// Adds the two presses of a cell that lie on its line of least squares, or one where its forces are all the same; what an estimate says
-    /// that the position changes is taken off.
+    /// Adds two presses on a cell's least-squares line, or one where all forces are equal.
     fn add_pair(&mut self, all: &All, cell: &[usize], estimate: Option<&Estimate>) {
         let sums = Sums::new(all, cell);
         let spread = sums.spread();
@@ -135,7 +135,7 @@ impl Presses {
         }
     }
 
-    /// Adds the one press of a cell; the weight of what the cell tells of the offset.
+    /// Adds the one press of a cell; returns the weight of the cell's information on the offset.
     fn add_cell(&mut self, all: &All, cell: &[usize], estimate: &Estimate) -> f64 {
         let sums = Sums::new(all, cell);
         let response = sums.mean_square.sqrt();
@@ -166,7 +166,7 @@ impl Presses {
     }
 }
 
-/// All presses, with φ/F̄ of each.
+/// All presses with their φ/F̄.
 struct All<'a> {
     presses: &'a Presses,
     responses: Vec<f64>,
@@ -174,7 +174,7 @@ struct All<'a> {
 }
 
 impl All<'_> {
-    /// Mean over a cell of the value of its k-th press, number i of all.
+    /// Weighted mean over a cell of `value(k, i)`: k is the index in the cell, i that in all presses.
     fn mean(&self, cell: &[usize], value: impl Fn(usize, usize) -> f64) -> f64 {
         let (sum, weight) = cell.iter().enumerate().fold((0.0, 0.0), |(sum, weight), (k, i)| {
             let own = self.weight(*i);
@@ -183,7 +183,7 @@ impl All<'_> {
         sum / weight
     }
 
-    /// Readings of a cell, as all of its presses would read at its middle by an estimate.
+    /// Readings of a cell, corrected to its mean position by `estimate`.
     fn readings(&self, cell: &[usize], sums: &Sums, estimate: Option<&Estimate>) -> Array2<f64> {
         let mut readings = self.presses.means.select(Dimension(0), cell);
         if let Some(estimate) = estimate
@@ -198,12 +198,12 @@ impl All<'_> {
         readings
     }
 
-    /// Rows of a press over the variance of one, relative to that of an untouched board.
+    /// Number of rows over the noise variance relative to an untouched row.
     fn weight(&self, i: usize) -> f64 {
         self.presses.count[i] / self.prior.relative_noise_of(self.presses, i)
     }
 
-    /// Rows of a press under a force at a place that have this weight.
+    /// Number of rows of a press with this weight.
     fn count_of(&self, weight: f64, force_n: f64, place_m: &[f64]) -> f64 {
         weight * self.prior.relative_noise(force_n, place_m)
     }
@@ -213,11 +213,10 @@ impl All<'_> {
     }
 }
 
-/// Sums over the presses of a cell.
+/// Weight and weighted means of a cell.
 struct Sums {
     position_m: Vec<f64>,
     weight: f64,
-    /// Mean.
     time: f64,
     /// Mean of φ/F̄, and of its square.
     response: f64,
@@ -248,7 +247,7 @@ impl Sums {
         }
     }
 
-    /// Standard deviation of φ/F̄; 0 where all are the same but for rounding.
+    /// Standard deviation of φ/F̄; 0 where values agree within rounding.
     fn spread(&self) -> f64 {
         const ROUNDING: f64 = 1e-12;
         let variance = self.mean_square - self.response * self.response;
@@ -256,12 +255,12 @@ impl Sums {
     }
 }
 
-/// Means of offsets and influences of unit response, as some presses tell them.
+/// Posterior means of offsets and influences of unit response.
 pub(super) struct Estimate {
     presses: Presses,
     responses: Vec<f64>,
     offsets: Array1<f64>,
-    /// Coefficients of the polynomials, and A⁻¹·(y − H·β), a column a channel.
+    /// Polynomial coefficients, and A⁻¹·(y − H·β), one column per channel.
     polynomials: Array2<f64>,
     weights: Array2<f64>,
 }
@@ -291,13 +290,13 @@ impl Estimate {
         })
     }
 
-    /// f̂ of every channel at a place.
+    /// f̂ of every channel at a position.
     fn influences(&self, prior: &Prior, place_m: &[f64]) -> Array1<f64> {
         let covariance = prior.influence_covariance(&self.presses, &self.responses, place_m);
         covariance.dot(&self.weights) + Array1::from(prior.polynomials_at(place_m)).dot(&self.polynomials)
     }
 
-    /// f̂ where each press of a cell is.
+    /// f̂ of every channel at each press of a cell.
     fn influences_at(&self, all: &All, cell: &[usize]) -> Array2<f64> {
         let mut influences = Array2::zeros((cell.len(), self.offsets.len()));
         for (k, i) in cell.iter().enumerate() {

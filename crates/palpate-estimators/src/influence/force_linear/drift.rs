@@ -1,34 +1,34 @@
-//! Drift of the channels' offsets in the course of a recording.
+//! Drift of the channels' offsets during a recording.
 
 use palpate_numerics::regression::Kernel;
 use serde::{Deserialize, Serialize};
 
-/// Time of the recording's last row, for whose offset is asked: what is located comes after it.
+/// Time of the recording's last row, where the offset is estimated: located readings come after it.
 pub(super) const END: f64 = 1.0;
 /// Time of the recording's first row.
 pub(super) const START: f64 = 0.0;
 
-/// Course of the drift, as a Gaussian process of the time from 0 at the recording's first row to 1 at its last.
+/// Course of the drift: a Gaussian process of time, from 0 at the first row to 1 at the last row.
 ///
-/// Whatever the course, the variance of what the drift changes from the first row to the last is 1.
+/// The change from the first row to the last has variance 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DriftCourse {
     /// A random walk.
     #[default]
     Walk,
-    /// In proportion to the time.
+    /// Proportional to time.
     Linear,
-    /// A smooth function of the time: a squared-exponential correlation over half the recording.
+    /// Smooth, with a squared-exponential correlation over half the recording.
     Smooth,
 }
 
 impl DriftCourse {
     pub(super) const ALL: [Self; 3] = [Self::Walk, Self::Linear, Self::Smooth];
 
-    /// Covariance of the remainder of the drift at two times until the end of the recording: the offset is that of the end.
+    /// Returns the covariance of the drift from times `a` and `b` to the last row.
     pub(super) fn covariance(self, a: f64, b: f64) -> f64 {
-        /// Of the smooth course.
+        /// Length scale of the smooth course.
         const LENGTH: f64 = 0.5;
         let correlation = |way: f64| Kernel::SquaredExponential.correlation((way / LENGTH) * (way / LENGTH));
         match self {

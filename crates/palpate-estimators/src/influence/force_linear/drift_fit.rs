@@ -1,8 +1,8 @@
-//! Drift of more presses than can be learnt from at once.
+//! Drift of many presses, by alternating estimates.
 //!
-//! Influences are learnt from presses whose drift was taken off, neighbours in space sharing a cell ([`super::condensed`]); offsets in the
-//! course of the recording from cells of neighbours in time, in which what the influences say that the position changes was taken off. Each is
-//! told by the estimate of the other before it, and the first by some of the presses alone.
+//! Influence functions follow from presses without their drift, condensed in space ([`super::condensed`]).
+//! Offsets over time follow from presses condensed in time, corrected for the change of influence with
+//! position. Each estimate uses the preceding one of the other kind; the first uses some of the presses.
 
 use super::condensed::Estimate;
 use super::drift::END;
@@ -14,7 +14,7 @@ use crate::influence::measured::MeasuredError;
 use ndarray::Array2;
 use palpate_numerics::watch::Watch;
 
-/// Drift of every channel, as presses that were condensed in time tell it.
+/// Drift of every channel, by presses condensed in time.
 pub(super) struct DriftFit {
     prior: Prior,
     fits: Vec<ChannelFit>,
@@ -22,8 +22,8 @@ pub(super) struct DriftFit {
 }
 
 impl Presses {
-    /// No more than about `most` presses that tell of a separable prior with drift what all of these tell, each as it would read at the end of
-    /// the recording; and the drift.
+    /// Returns about `most` presses equivalent to all under a separable prior with drift, corrected to the
+    /// last row, and the drift.
     pub fn condensed_under_drift(
         &self,
         prior: &Prior,
@@ -31,7 +31,7 @@ impl Presses {
         most: usize,
         watch: Watch,
     ) -> Result<(Self, DriftFit), MeasuredError> {
-        /// Estimates of the drift, each by influences from the last one.
+        /// Rounds of the alternation.
         const ROUNDS: usize = 2;
         let mut few = self.thinned(most);
         let mut drift = None;
@@ -48,12 +48,12 @@ impl Presses {
 }
 
 impl DriftFit {
-    /// Mean and variance of the offset of every channel at each of some times.
+    /// Mean and variance of every channel's offset at each time.
     fn offsets_at(&self, times: &[f64]) -> Result<Vec<Vec<(f64, f64)>>, MeasuredError> {
         offsets(&self.prior, &self.presses, &self.fits, &[], times)
     }
 
-    /// The drift of every channel from each of some times to the end of the recording, a row a channel.
+    /// Returns the drift of every channel from each time to the last row, one row per channel.
     pub fn until_the_end(&self, times: &[f64]) -> Result<Vec<Vec<f64>>, MeasuredError> {
         let all = self.offsets_at(&[&[END], times].concat())?;
         let of_channel = |offsets: Vec<(f64, f64)>| {
@@ -63,12 +63,12 @@ impl DriftFit {
         Ok(all.into_iter().map(of_channel).collect())
     }
 
-    /// Variance of the offset of every channel at the end.
+    /// Returns the variance of every channel's offset at the last row.
     pub fn variances_at_the_end(&self) -> Result<Vec<f64>, MeasuredError> {
         Ok(self.offsets_at(&[END])?.iter().map(|of_channel| of_channel[0].1).collect())
     }
 
-    /// Presses as they would read at the end.
+    /// Presses with readings corrected to the last row.
     fn taken_off(&self, presses: &Presses) -> Result<Presses, MeasuredError> {
         let drifts = self.until_the_end(&presses.time)?;
         let drifts = Array2::from_shape_fn(presses.means.dim(), |(i, c)| drifts[c][i]);

@@ -1,12 +1,14 @@
-//! Evidence of a channel's presses under a prior, by the restricted likelihood: offsets and polynomials are projected out, as their
-//! coefficients are as likely as any others (Patterson and Thompson, Biometrika 58, 1971; Rasmussen and Williams, *Gaussian Processes for
-//! Machine Learning*, 2006, section 2.7).
+//! Restricted log evidence of a channel's presses under a prior.
 //!
-//! With A = L·Lᵀ the covariance of the presses over s², H what they read of offset and polynomials, and M the projection of L⁻¹·y
-//! onto what H leaves, the evidence of presses y is −½·(ν·ln s² + ln|A| + ln|Hᵀ·A⁻¹·H|), with s² = |M·L⁻¹·y|²/ν at its most probable
-//! and ν the number of presses less that of the columns of H. A source at p whose amplitude has the variance τ·s² adds the column u(p) to
-//! the covariance, a rank-1 change: |M·L⁻¹·y|² falls by τ·(vᵀ·w)²/(1 + τ·vᵀ·v), with v = M·L⁻¹·u and w = M·L⁻¹·y, and the
-//! determinants grow by ln(1 + τ·vᵀ·v). Places and orders of magnitude of τ are averaged over.
+//! Offset and polynomials have flat priors and are projected out (Patterson and Thompson, Biometrika 58,
+//! 1971; Rasmussen and Williams, *Gaussian Processes for Machine Learning*, 2006, section 2.7).
+//!
+//! Let A = L·Lᵀ be the covariance of the presses over s², H the design matrix of offset and polynomials, and
+//! M the projection of L⁻¹·y orthogonal to L⁻¹·H. The log evidence is −½·(ν·ln s² + ln|A| + ln|Hᵀ·A⁻¹·H|),
+//! with s² = |M·L⁻¹·y|²/ν at the maximum and ν the number of presses minus the columns of H. A source at p
+//! with amplitude variance τ·s² adds the column u(p), a rank-1 update: |M·L⁻¹·y|² falls by τ·(vᵀ·w)²/(1 +
+//! τ·vᵀ·v), with v = M·L⁻¹·u and w = M·L⁻¹·y, and the determinants grow by ln(1 + τ·vᵀ·v). The evidence is
+//! averaged over positions and powers of ten of τ.
 
 use super::presses::{Presses, Repeated};
 use super::prior::Prior;
@@ -16,19 +18,19 @@ use palpate_numerics::{Cholesky, NotPositiveDefinite, mean_and_variance};
 
 /// Powers of ten of ρ.
 type Decades = std::ops::RangeInclusive<i32>;
-/// Those that are tried where nothing is known of them.
+/// Search range without a previous fit.
 pub(super) const ALL_DECADES: Decades = -10..=1;
-/// Powers of ten of τ, all as likely.
+/// Powers of ten of τ, with equal prior probability.
 const AMPLITUDES: std::ops::RangeInclusive<i32> = 0..=6;
-/// Sources less probable than this share of the most probable one are left out.
+/// Least weight of a source relative to the largest.
 const LEAST_SHARE: f64 = 1e-3;
 
-/// A covariance with its factor, and what is left beside offset and polynomials.
+/// Factored covariance, with offset and polynomials projected out.
 pub(super) struct Restricted {
     pub cholesky: Cholesky,
     /// L⁻¹·H, n × q.
     effects: Array2<f64>,
-    /// Of Hᵀ·A⁻¹·H.
+    /// Factor of Hᵀ·A⁻¹·H.
     gram: Cholesky,
     /// ln|A| + ln|Hᵀ·A⁻¹·H|.
     pub log_determinant: f64,
@@ -36,7 +38,7 @@ pub(super) struct Restricted {
 
 impl Restricted {
     /// # Errors
-    /// [`NotPositiveDefinite`] where the presses do not tell offset and polynomials apart.
+    /// [`NotPositiveDefinite`] where offset and polynomials are unidentifiable.
     pub fn new(covariance: Array2<f64>, effects: &Array2<f64>) -> Result<Self, NotPositiveDefinite> {
         let cholesky = Cholesky::factor(covariance)?;
         let effects = cholesky.solve_lower_matrix(effects.clone());
@@ -50,12 +52,12 @@ impl Restricted {
         self.effects.ncols()
     }
 
-    /// The coefficients of H in each column of L⁻¹·y.
+    /// Coefficients of H for each column of L⁻¹·y.
     pub fn coefficients(&self, white: &Array2<f64>) -> Array2<f64> {
         self.gram.solve_matrix(self.effects.t().dot(white))
     }
 
-    /// M·L⁻¹·y of each column of y, with the coefficients of H.
+    /// M·L⁻¹·y of each column of y, and the coefficients of H.
     pub fn residuals(&self, columns: Array2<f64>) -> (Array2<f64>, Array2<f64>) {
         self.residuals_of_white(self.cholesky.solve_lower_matrix(columns))
     }
@@ -65,39 +67,39 @@ impl Restricted {
         self.residuals_of_white(self.cholesky.inverse_lower()).0
     }
 
-    /// M·x of each column x = L⁻¹·y, with the coefficients of H.
+    /// M·x of each column x = L⁻¹·y, and the coefficients of H.
     fn residuals_of_white(&self, mut white: Array2<f64>) -> (Array2<f64>, Array2<f64>) {
         let coefficients = self.coefficients(&white);
         general_mat_mul(-1.0, &self.effects, &coefficients, 1.0, &mut white);
         (white, coefficients)
     }
 
-    /// R⁻ᵀ·(h − Hᵀ·A⁻¹·k) for columns of `h` and L⁻¹·k, `white`: scalar products of its columns are covariances.
+    /// R⁻ᵀ·(h − Hᵀ·A⁻¹·k), with `white` = L⁻¹·k: inner products of columns are covariances.
     pub fn open_effects(&self, h: &Array2<f64>, white: &Array2<f64>) -> Array2<f64> {
         self.gram.solve_lower_matrix(h - &self.effects.t().dot(white))
     }
 }
 
-/// A source of a channel.
+/// Point source of a channel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SourceFit {
-    /// Number of its place in the list of places.
+    /// Index of the position.
     pub place: usize,
-    /// Posterior probability, and the share of 1 that all weights sum to.
+    /// Posterior probability; all weights sum to 1.
     pub weight: f64,
-    /// Mean of its amplitude, and its variance over s².
+    /// Mean of the amplitude, and its variance over s².
     pub amplitude: f64,
     pub variance: f64,
 }
 
-/// Noise and signal of one channel under a prior, and its sources.
+/// Noise, signal and sources of one channel under a prior.
 #[derive(Clone, Debug)]
 pub(super) struct ChannelFit {
-    /// ρ, the noise's variance over s².
+    /// ρ: noise variance over s².
     pub ratio: f64,
     /// s².
     pub signal: f64,
-    /// ln of the probability density of the channel's presses and its noise, less a constant.
+    /// Log density of the presses and noise, up to a constant.
     pub evidence: f64,
     pub sources: Vec<SourceFit>,
 }
@@ -107,37 +109,37 @@ impl ChannelFit {
         self.signal * self.ratio
     }
 
-    /// The source whose place is the most probable; `None` where none are looked for.
+    /// Returns the source of largest weight; `None` without sources.
     pub fn most_probable_source(&self) -> Option<&SourceFit> {
         self.sources.iter().max_by(|a, b| a.weight.total_cmp(&b.weight))
     }
 }
 
-/// Presses whose evidence is asked under one prior, and the places of sensors that are tried.
+/// Log evidence of presses under one prior, with candidate positions of sources.
 pub(super) struct Evidence<'a> {
     pub presses: &'a Presses,
     pub prior: &'a Prior,
     /// Without noise and drift.
     covariance: Array2<f64>,
-    /// Of noise and drift, over ρ.
+    /// Noise and drift, over ρ.
     noise: Noise,
     effects: Array2<f64>,
-    /// Readings of the presses by a source of unit amplitude at each place.
+    /// Readings by a unit source at each position.
     sources: Array2<f64>,
     repeats: RepeatedNoise,
     noise_priors: Vec<NoisePrior>,
 }
 
-/// Prior of a channel's noise.
+/// Prior of a channel's noise for few presses.
 ///
-/// As many presses as coefficients are explained without any noise: what they leave open is filled with what boards are like. Their
-/// noise is about a hundredth of what presses change, give or take a factor of three, with heavy tails (Student's t of one degree of
-/// freedom), as there are boards far better and far worse; and it is no less than rounding.
+/// With as many coefficients as presses the likelihood favours zero noise. The prior centres the noise at 1 %
+/// of the signal, within a factor of three and with heavy tails (Student's t, one degree of freedom). It
+/// excludes noise below rounding.
 struct NoisePrior {
-    /// Mean square of the changes.
+    /// Variance of the readings.
     changes: f64,
     rounding: f64,
-    /// Of [`Presses::fewness`].
+    /// [`Presses::fewness`].
     weight: f64,
 }
 
@@ -150,9 +152,9 @@ impl NoisePrior {
         (0..presses.centre.len()).map(channel).collect()
     }
 
-    /// ln of the probability density of ln σ², less a constant.
+    /// Log density of ln σ², up to a constant.
     fn log_density(&self, variance: f64) -> f64 {
-        /// Variance over that of the changes, and the scale of its power of ten.
+        /// Centre over `changes`, and scale in powers of ten.
         const SHARE: f64 = 1e-4;
         const DECADES: f64 = 1.0;
         if self.weight == 0.0 || self.changes <= 0.0 || variance <= 0.0 {
@@ -163,11 +165,11 @@ impl NoisePrior {
     }
 }
 
-/// Covariance of noise and drift of the presses over that of an untouched row.
+/// Covariance of noise and drift, over the noise variance of an untouched row.
 struct Noise {
-    /// Of the noise, which is independent.
+    /// Variances of the independent noise.
     diagonal: Vec<f64>,
-    /// n × n; nothing where there is none.
+    /// n × n; `None` without drift.
     drift: Option<Array2<f64>>,
 }
 
@@ -193,12 +195,12 @@ impl Noise {
     }
 }
 
-/// Noise of untouched rows as the scatter of repeats tells it.
+/// Sums of squares of repeats, for the noise of untouched rows.
 struct RepeatedNoise {
     freedom: f64,
-    /// Sum of squared deviations of each channel, each over the noise's variance relative to that of untouched rows.
+    /// Squared deviations per channel, over the relative noise variance.
     squares: Array1<f64>,
-    /// Σ ln of those relative variances.
+    /// Σ ν·ln of the relative variances.
     log_determinant: f64,
 }
 
@@ -236,23 +238,24 @@ impl<'a> Evidence<'a> {
         }
     }
 
-    /// Degrees of freedom of a channel's presses.
+    /// Degrees of freedom of a channel.
     fn freedom(&self) -> f64 {
         self.presses.len() as f64 + self.repeats.freedom - self.effects.ncols() as f64
     }
 
-    /// The covariance at one ρ.
+    /// Factors the covariance at one ρ.
     pub fn restricted(&self, ratio: f64) -> Result<Restricted, NotPositiveDefinite> {
         Restricted::new(self.noise.added_to(&self.covariance, ratio), &self.effects)
     }
 
-    /// The most probable ρ of every channel among some powers of ten; `None` where the presses do not tell offset and polynomials apart.
+    /// Returns the fit of every channel at its best power of ten of ρ; `None` where offset and polynomials
+    /// are unidentifiable.
     pub fn best_decades(&self, decades: Decades) -> Option<Vec<ChannelFit>> {
         let ratios = decades.map(|decade| 10f64.powi(decade));
         self.best_of(ratios)
     }
 
-    /// The same to a quarter of a power of ten, around fits that were found.
+    /// Refines ρ to a quarter of a power of ten around `fits`.
     pub fn refined(&self, fits: Vec<ChannelFit>) -> Vec<ChannelFit> {
         const STEPS: std::ops::RangeInclusive<i32> = -3..=3;
         let mut ratios: Vec<f64> = Vec::new();
@@ -284,7 +287,7 @@ impl<'a> Evidence<'a> {
         best
     }
 
-    /// The fit of every channel at one ρ.
+    /// Fits of all channels at one ρ.
     fn with_ratio(&self, ratio: f64) -> Option<Vec<ChannelFit>> {
         let restricted = self.restricted(ratio).ok()?;
         let (white, _) = restricted.residuals(self.presses.means.clone());
@@ -301,7 +304,7 @@ impl<'a> Evidence<'a> {
         fits.iter().all(|fit| fit.evidence.is_finite()).then_some(fits)
     }
 
-    /// The fit of channel `c` at one ρ, from M·L⁻¹·y of its presses and the sources with their products with it.
+    /// Returns the fit of channel `c` at one ρ; `white` is M·L⁻¹·y.
     pub fn channel(
         &self,
         restricted: &Restricted,
@@ -334,19 +337,19 @@ impl<'a> Evidence<'a> {
     }
 }
 
-/// Sources at places as presses at one ρ tell them, of any channel.
+/// Candidate sources projected by M·L⁻¹ at one ρ.
 #[derive(Clone)]
 pub(super) struct WhiteSources {
-    /// v = M·L⁻¹·u, a column a place.
+    /// v = M·L⁻¹·u, one column per position.
     pub columns: Array2<f64>,
     amplitudes: Vec<Amplitude>,
 }
 
-/// A source at one of the places, with an amplitude of the variance τ·s².
+/// Source at one position, with amplitude variance τ·s².
 #[derive(Clone, Copy)]
 struct Amplitude {
     place: usize,
-    /// Variance of the amplitude over s², given the presses: τ/(1 + τ·vᵀ·v).
+    /// Posterior variance of the amplitude over s²: τ/(1 + τ·vᵀ·v).
     variance: f64,
     /// ln(1 + τ·vᵀ·v).
     log_determinant: f64,
@@ -374,13 +377,13 @@ impl WhiteSources {
         self.columns.ncols() == 0
     }
 
-    /// vᵀ·w of each place and each column w of M·L⁻¹·y.
+    /// Returns vᵀ·w of each position and column w of M·L⁻¹·y.
     pub fn products(&self, white: &ArrayView2<f64>) -> Array2<f64> {
         self.columns.t().dot(white)
     }
 }
 
-/// The average over sources of given evidence and signal.
+/// Averages fits over sources by their evidence.
 fn average(ratio: f64, tried: &mut [(f64, f64, SourceFit)]) -> ChannelFit {
     let best = tried.iter().fold(f64::NEG_INFINITY, |best, (evidence, ..)| best.max(*evidence));
     tried.iter_mut().for_each(|(evidence, _, source)| source.weight = (*evidence - best).exp());

@@ -1,9 +1,8 @@
-//! From presses of recorded force to the influence functions of a surface without a model.
+//! Learning of influence functions from presses of recorded force.
 //!
-//! Two priors are tried: influence functions that are smooth, and those of point sensors at unknown places ([`Prior::source`]). Length
-//! scales and shares of each are those under which the presses are the most probable; between the two, held-out positions decide. What
-//! the process claims of them is checked, and its variance widened where it is too small. Presses that no function explains are set
-//! aside, and the rest learnt anew.
+//! Two families of priors compete at held-out positions: smooth functions, and point sensors at unknown
+//! positions ([`Prior::source`]). Hyperparameters maximize the log evidence. A variance factor from the
+//! held-out errors corrects the process variance. Outliers are excluded, and the rest is learnt again.
 
 use super::drift::{DriftCourse, END, START};
 use super::drift_fit::DriftFit;
@@ -26,39 +25,39 @@ use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{bisect, mean};
 use std::sync::Arc;
 
-/// Presses that the search for kernel and length scales looks at.
+/// Most presses in the search for kernel and length scales.
 pub(crate) const MOST_SEARCHED: usize = 150;
-/// Presses that are learnt from, as the time grows with their cube; more are condensed to so many.
+/// Most presses of a fit, with time cubic in their number; more are condensed.
 pub(crate) const MOST_PRESSES: usize = 1000;
-/// Distinct positions from which on every fifth can be held out.
+/// Least distinct positions for hold-out.
 const LEAST_TO_JUDGE: usize = 6;
-/// Every fifth position is held out.
+/// Number of folds: every fifth position is held out.
 pub(crate) const FOLDS: usize = 5;
 
 /// Prior, noise and presses of a surface, estimated from a recording.
 pub(super) struct Learnt {
     /// All presses of the channels in use.
     pub pressed: Presses,
-    /// Presses that are learnt from: all of them, or fewer condensed ones.
+    /// Presses of the fit: all, or condensed ones.
     presses: Presses,
-    /// Drift that was subtracted from these.
+    /// Drift subtracted from `presses`.
     drift: Option<DriftFit>,
     pub prior: Prior,
-    /// The channels that change, from 0.
+    /// Channels that change, from 0.
     pub live: Vec<usize>,
     /// Noise and signal of the channels in use.
     fits: Vec<ChannelFit>,
-    /// Places where sensors are looked for, in metres.
+    /// Candidate sensor positions, in metres.
     sensors_m: Vec<Vec<f64>>,
-    /// Factor of the variance of the learnt functions, by which the errors at held-out positions agree with it.
+    /// Variance factor of the process, estimated at held-out positions.
     widening: f64,
-    /// Outliers: rows from 0, in rising order.
+    /// Outliers: rows from 0, ascending.
     pub set_aside: Vec<usize>,
 }
 
 impl Learnt {
-    /// Learns from the presses of a recording, or returns the functions that an earlier fit of the task has learnt; `None` where their forces do not
-    /// separate influences from offsets, or no channel changes.
+    /// Learns from a recording, or returns the result of an earlier fit of the task. Returns `None` where
+    /// forces do not separate influences from offsets, or no channel changes.
     pub fn of_task(
         task: FitTask,
         structure: Structure,
@@ -83,15 +82,15 @@ impl Learnt {
             Self::without_outliers(setup, recording, structure, most_presses, noise, watch)
         };
         let Some(learnt) = learn(None)? else { return Ok(None) };
-        // Rows that nothing explains look like noise of their place, and noise of a place like rows that nothing explains: the noise follows from
-        // rows that are none, and rows are set aside by that noise.
+        // Outliers resemble local noise and vice versa: noise is estimated without outliers, then outliers
+        // are found with it.
         match learnt.noise_by_place(watch)? {
             None => Ok(Some(learnt)),
             Some(noise) => learn(Some(&noise)),
         }
     }
 
-    /// Learns from the presses that some function explains.
+    /// Learns with outliers excluded.
     fn without_outliers(
         setup: &Setup,
         recording: &Recording,
@@ -100,7 +99,7 @@ impl Learnt {
         noise: Option<&PlaceNoise>,
         watch: Watch,
     ) -> Result<Option<Self>, MeasuredError> {
-        /// Rounds in which presses are set aside, and the share of all rows that may be.
+        /// Rounds of exclusion, and the largest excluded share of all rows.
         const ROUNDS: usize = 4;
         const MOST_SET_ASIDE: f64 = 0.1;
         let learn = |set_aside: &[usize]| {
@@ -158,7 +157,7 @@ impl Learnt {
                 pressed.condensed_under_drift(&smooth.prior, &smooth.fits, most_presses, watch)?;
             (presses, Some(drift))
         } else {
-            // Repeats tell of the noise, which near positions do not.
+            // Repeats of one position determine the noise; neighbouring positions do not.
             let merged = presses_of(Repeats::All).map(|merged| merged.of_channels(&live));
             let merged = merged.as_ref().unwrap_or(&pressed);
             (merged.condensed(&smooth.prior, &smooth.fits, most_presses, watch)?, None)
@@ -169,7 +168,7 @@ impl Learnt {
         {
             match Judged::new(sources, &presses, watch) {
                 Ok(sources) => judged.push(sources),
-                // Without some of the positions the presses do not tell its polynomials: they cannot judge it.
+                // Without the held-out positions the polynomials are unidentifiable: the prior has no score.
                 Err(MeasuredError::Noise(_)) => {}
                 Err(error) => return Err(error),
             }
@@ -182,17 +181,17 @@ impl Learnt {
         Ok(Some(Self { pressed, presses, drift, prior, live, fits, sensors_m, widening, set_aside }))
     }
 
-    /// Standard deviation of each channel's noise.
+    /// Returns the standard deviation of each channel's noise.
     pub fn noise_sd(&self) -> Vec<f64> {
         self.fits.iter().map(|fit| fit.noise_variance().sqrt()).collect()
     }
 
-    /// Loadings of the errors that all channels share.
+    /// Returns the loadings of common-mode errors.
     pub fn shared_errors(&self) -> Result<Vec<f64>, MeasuredError> {
         Ok(loadings(&self.presses, &self.prior, &self.fits, &self.sensors_m)?)
     }
 
-    /// Offsets, and influences at `places_m` per newton of φ.
+    /// Returns offsets, and influences at `places_m` per newton of φ.
     pub fn functions(&self, places_m: &[Vec<f64>], watch: Watch) -> Result<Vec<Functions>, MeasuredError> {
         let mut functions =
             all_functions(&self.prior, &self.presses, &self.fits, &self.sensors_m, places_m, watch)?;
@@ -213,12 +212,13 @@ impl Learnt {
         Ok(functions)
     }
 
-    /// Offset of every channel in use at each of some times, as shares of the recording; `None` where no drift was found.
+    /// Returns the offset of every channel in use at `times`, as fractions of the recording; `None` without
+    /// drift.
     pub fn offsets_at(&self, times: &[f64]) -> Result<Option<Vec<Vec<f64>>>, MeasuredError> {
         if self.prior.drift == 0.0 {
             return Ok(None);
         }
-        // Presses whose drift was taken off tell the offset of the end.
+        // `presses` are corrected to the last row.
         let ends = vec![END; times.len()];
         let asked = if self.drift.is_some() { &ends } else { times };
         let found = offsets(&self.prior, &self.presses, &self.fits, &self.sensors_m, asked)?;
@@ -232,13 +232,13 @@ impl Learnt {
         Ok(Some(all))
     }
 
-    /// Change of the offset of every channel in use from the first row to the last; empty without a drift.
+    /// Returns the change of every offset from the first row to the last; empty without drift.
     pub fn drifts(&self) -> Result<Vec<f64>, MeasuredError> {
         let ends = self.offsets_at(&[START, END])?.unwrap_or_default();
         Ok(ends.into_iter().map(|offsets| offsets[1] - offsets[0]).collect())
     }
 
-    /// Offset of every channel in use at each of some times, the same at all without a drift.
+    /// Returns the offset of every channel in use at `times`, constant without drift.
     pub fn offsets_at_or_constant(&self, times: &[f64]) -> Result<Vec<Vec<f64>>, MeasuredError> {
         if let Some(drifting) = self.offsets_at(times)? {
             return Ok(drifting);
@@ -247,14 +247,14 @@ impl Learnt {
         Ok(constant.into_iter().map(|offsets| vec![offsets[0].0; times.len()]).collect())
     }
 
-    /// Log evidence of other readings of these presses under the prior, with the scatter that makes it largest.
+    /// Returns the log evidence of other readings of these presses, maximized over the scatter.
     pub fn log_evidence(
         &self,
         setup: &Setup,
         recording: &Recording,
         watch: Watch,
     ) -> Result<f64, MeasuredError> {
-        /// One of so many places of sensors shows as much.
+        /// Stride of sensor positions: fewer give nearly equal evidence.
         const ONE_OF: usize = 5;
         let Some(presses) = Presses::of_recording(setup, recording, Repeats::Consecutive, &[]) else {
             return Ok(f64::NEG_INFINITY);
@@ -269,9 +269,9 @@ impl Learnt {
         Ok(search.best_of(priors, &few)?.0)
     }
 
-    /// First rows of presses that nothing explains.
+    /// Returns the first rows of outlying presses.
     fn outliers(&self, watch: Watch) -> Result<Vec<usize>, MeasuredError> {
-        /// Learning anew after each would take long.
+        /// Outliers per round: one by one would take long.
         const AT_ONCE: usize = 3;
         let test = OutlierTest { prior: &self.prior, fits: &self.fits, sensors_m: &self.sensors_m };
         if self.presses.len() == self.pressed.len() {
@@ -281,9 +281,9 @@ impl Learnt {
         }
     }
 
-    /// Noise that differs by place; `None` where the presses do not tell it.
+    /// Estimates position-dependent noise; `None` where the evidence does not support it.
     fn noise_by_place(&self, watch: Watch) -> Result<Option<PlaceNoise>, MeasuredError> {
-        /// The noise is told as well by one of so many places of sensors.
+        /// Stride of sensor positions: fewer give nearly equal noise.
         const ONE_OF: usize = 5;
         let searched = self.pressed.thinned(MOST_SEARCHED);
         let few: Vec<Vec<f64>> = self.sensors_m.iter().step_by(ONE_OF).cloned().collect();
@@ -291,11 +291,11 @@ impl Learnt {
     }
 }
 
-/// Factor of the variance of a process whose size few positions told: that of Student's t over the normal density's.
+/// Variance factor for a process scale from few positions: that of Student's t over the normal density.
 fn few_positions(prior: &Prior, presses: &Presses) -> f64 {
-    /// Fewer degrees of freedom have no variance at all.
+    /// Student's t has a variance above 2 degrees of freedom.
     const LEAST: usize = 3;
-    /// Of the length scale, which the same positions told.
+    /// Degree of freedom of the length scale.
     const LENGTH: usize = 1;
     let of_presses = presses.len().saturating_sub(1 + prior.polynomials() + LENGTH);
     let of_positions = presses.positions_m().len().saturating_sub(prior.polynomials() + LENGTH);
@@ -303,16 +303,17 @@ fn few_positions(prior: &Prior, presses: &Presses) -> f64 {
     1.0 + presses.fewness() * (freedom / (freedom - 2.0) - 1.0)
 }
 
-/// Factor by which the channels' errors are less independent than their number.
+/// Variance factor for correlated errors of the channels.
 ///
-/// A wrong position or force makes presses scatter with their force, in all channels alike; half of it is taken to move the position. The variance of every channel multiplied by the factor is that of a position told by one, not by the mean of all.
+/// A wrong position or force makes all channels scatter with the force; half of this scatter is assumed to
+/// shift the position. The factor makes the position as uncertain as by one channel, not by the mean of all.
 fn dependence(prior: &Prior, presses: &Presses) -> f64 {
     const MOVES_POSITION: f64 = 0.5;
     let scattered = mean(presses.force_n.iter().map(|force_n| 1.0 - 1.0 / prior.scatter_of(*force_n)));
     1.0 + scattered * (MOVES_POSITION * presses.centre.len() as f64 - 1.0).max(0.0)
 }
 
-/// Functions of all channels, in their order.
+/// Functions of all channels, in order.
 fn all_functions(
     prior: &Prior,
     presses: &Presses,
@@ -331,24 +332,23 @@ fn all_functions(
     Ok(all.into_iter().map(|(_, functions)| functions).collect())
 }
 
-/// The most probable of a family of priors.
+/// Prior with the largest log evidence of its family.
 struct Found {
     prior: Prior,
     fits: Vec<ChannelFit>,
-    /// Places where sensors are looked for, in metres.
     sensors_m: Vec<Vec<f64>>,
 }
 
-/// A prior with its score at held-out positions.
+/// Prior with its score at held-out positions.
 struct Judged {
     found: Found,
-    /// ln of the probability density of the presses that were held out.
+    /// Log density of the held-out presses.
     score: f64,
     widening: f64,
 }
 
 impl Judged {
-    /// Holds out every fifth position in turn; too few positions are not judged.
+    /// Holds out every fifth position in turn; the score is 0 with too few positions.
     fn new(found: Found, presses: &Presses, watch: Watch) -> Result<Self, MeasuredError> {
         const MOST: f64 = 25.0;
         let positions_m = presses.positions_m();
@@ -383,7 +383,7 @@ impl Judged {
 }
 
 impl Found {
-    /// Adds the squared errors of presses `held` out of those `kept`, with what noise and process say of them.
+    /// Adds squared errors of presses `held`, predicted from `kept`, with the variances of noise and process.
     fn add_errors(
         &self,
         presses: &Presses,
@@ -409,37 +409,36 @@ impl Found {
     }
 }
 
-/// Nonlinearities that are tried.
+/// Candidate nonlinearities δ.
 const NONLINEARITIES: [f64; 5] = [0.03, 0.1, 0.3, 1.0, 3.0];
-/// Variances of drift over that of the noise that are tried first.
+/// Candidate variances of drift over noise.
 const DRIFTS: [f64; 3] = [10.0, 100.0, 1e3];
-/// Ten times the drift is believed from this much more evidence on.
+/// Least gain of log evidence for a tenfold drift.
 const LEAST_MORE: f64 = 3.0;
-/// Variances of the scatter of presses of the mean square force, over that of the noise, that are tried.
+/// Candidate variances of scatter at the mean square force, over noise.
 const SCATTERS: [f64; 5] = [1.0, 4.0, 16.0, 64.0, 256.0];
-/// Exponents of the response that are tried.
+/// Candidate exponents of the response.
 const RESPONSES: [f64; 4] = [0.5, 0.75, 1.33, 2.0];
-/// A smoother kernel is believed from this much more evidence on: it claims to know more between the presses.
+/// Least gain of log evidence for a smoother kernel, which claims more certainty between presses.
 const LEAST_SMOOTHER: f64 = 10.0;
-/// A departure from offset + force × influence is believed from this much more evidence on.
+/// Least gain of log evidence for a departure from offset + force × influence.
 const LEAST_GAIN: f64 = 10.0;
 
-/// The search for the most probable priors.
+/// Search for the prior of largest log evidence.
 struct Search<'a> {
     presses: &'a Presses,
     extent: Extent,
     structure: Structure,
-    /// Noise that differs by place.
     noise: Option<&'a PlaceNoise>,
     watch: Watch<'a>,
-    /// Powers of ten about those of the noise of the channels, as the last prior told them.
+    /// Powers of ten of ρ around those of the last prior.
     decades: (i32, i32),
 }
 
 impl Search<'_> {
-    /// The evidence of all channels together, their noise about that of the last prior.
+    /// Log evidence of all channels, with ρ near that of the last prior.
     fn total(&mut self, prior: &Prior, sensors_m: &[Vec<f64>]) -> Result<f64, Cancelled> {
-        /// Most that the noise of a channel moves from one prior to the next, in powers of ten.
+        /// Largest change of ρ between priors, in powers of ten.
         const ABOUT: i32 = 2;
         self.watch.round()?;
         let (from, to) = self.decades;
@@ -452,14 +451,14 @@ impl Search<'_> {
         Ok(fits.iter().map(|fit| fit.evidence).sum())
     }
 
-    /// The same, of a prior whose noise may be of any size.
+    /// [`Self::total`] over the full range of ρ.
     fn total_anew(&mut self, prior: &Prior, sensors_m: &[Vec<f64>]) -> Result<f64, Cancelled> {
         self.decades = (*ALL_DECADES.start(), *ALL_DECADES.end());
         self.total(prior, sensors_m)
     }
 
-    /// The most probable smooth prior: the smoother kernel on sufficient evidence, length scales by ever smaller steps; drift, response and
-    /// nonlinearity last.
+    /// Maximizes the evidence of a smooth prior: kernel, length scales, drift, scatter, response and
+    /// nonlinearity in turn.
     fn smooth(&mut self) -> Result<Found, Cancelled> {
         let noise_by_place = self.noise.cloned();
         let rough = Prior { noise_by_place, ..Prior::smooth(self.extent, self.presses) };
@@ -482,7 +481,7 @@ impl Search<'_> {
         if self.structure == Structure::Auto {
             let changed = NONLINEARITIES.map(|nonlinearity| Prior { nonlinearity, ..prior.clone() });
             let (found, nonlinear) = self.best_of(changed, &[])?;
-            // Presses that scatter more the harder they are look like influences that change with the force.
+            // Scatter that grows with force resembles influences that change with force.
             let scatters = SCATTERS.map(|scatter| Prior { scatter, ..prior.clone() });
             let (scattered, _) = self.best_of(scatters, &[])?;
             if found > best.max(scattered) + LEAST_GAIN * dependence(&prior, self.presses) {
@@ -492,7 +491,7 @@ impl Search<'_> {
         Ok(self.found(prior, &[]))
     }
 
-    /// The prior with another drift, where that is more probable by [`LEAST_GAIN`] than `best`, the evidence of `prior`, and the presses can tell one.
+    /// Returns a prior with drift where it is identifiable and gains more than [`LEAST_GAIN`] over `best`.
     fn drift(
         &mut self,
         best: f64,
@@ -509,14 +508,15 @@ impl Search<'_> {
         let times = |factor: f64| Prior { drift: coarse.1.drift * factor, ..coarse.1.clone() };
         let more = self.best_of([times(10.0)], sensors_m)?;
         let less = self.best_of([times(0.1)], sensors_m)?;
-        // Much drift leaves little noise, of which few presses know nothing: it has to be more probable than a tenth of it.
+        // Large drift leaves little noise, which few presses do not bound: a tenfold drift needs more
+        // evidence.
         let found = [less, coarse, more]
             .into_iter()
             .reduce(|found, next| if next.0 > found.0 + LEAST_MORE { next } else { found });
         Ok(found.filter(|(total, _)| *total > best + LEAST_GAIN))
     }
 
-    /// The prior with noise that grows with the force, where that is more probable by [`LEAST_GAIN`] than `best`, the evidence of `prior`.
+    /// Returns a prior with noise that grows with force where it gains more than [`LEAST_GAIN`] over `best`.
     fn scatter(
         &mut self,
         best: f64,
@@ -542,7 +542,8 @@ impl Search<'_> {
         Ok(best.expect("at least one prior is tried"))
     }
 
-    /// The response to the force: linear, unless another exponent is more probable by [`LEAST_GAIN`].
+    /// Response to the force: linear, unless another exponent gains [`LEAST_GAIN`] or the structure requires
+    /// one.
     fn response(&mut self, best: f64, linear: Prior) -> Result<(f64, Prior), Cancelled> {
         let (mut found, mut prior) =
             self.best_of(RESPONSES.map(|response| Prior { response, ..linear.clone() }), &[])?;
@@ -564,16 +565,17 @@ impl Search<'_> {
         self.climb_lengths(prior)
     }
 
-    /// The most probable prior of point sensors: which kind of source, then what share is smooth and over what length; `None` where the
-    /// presses are less than twice its coefficients, polynomials and offset, or places less than twice the polynomials.
+    /// Maximizes the evidence of point sensors: kind of source, then smooth part and length scale. Returns
+    /// `None` with too few presses or positions for the polynomials.
     fn sources(&mut self, smooth: &Prior) -> Result<Option<Found>, Cancelled> {
-        /// η² and ℓ, in lengths of the surface; on a plane a smooth part is always needed.
+        /// η², and ℓ in lengths of the surface; a plane always needs a smooth part.
         const SHARES: [f64; 4] = [0.0, 1e-4, 1e-2, 1.0];
         const LENGTHS: [f64; 4] = [0.1, 0.2, 0.4, 0.8];
-        /// The drift is told as well by one of so many places of sensors.
+        /// Stride of sensor positions for drift and scatter.
         const ONE_OF: usize = 5;
         let sensors_m = everywhere(self.extent);
-        // Each press or each place, or nearly, would be a coefficient, and what is left tells no variance.
+        // With fewer, nearly each press or position is a coefficient, and residuals do not determine the
+        // variance.
         let polynomials = Prior { source: Some(Source::Strain), ..smooth.clone() }.polynomials();
         let (presses, places) = (self.presses.len(), self.presses.positions_m().len());
         if presses < 2 * (1 + polynomials) || places < 2 * polynomials {
@@ -583,7 +585,7 @@ impl Search<'_> {
         let plane = dimensions == 2;
         let of_length = |source: Source, share: f64, length: f64| Prior {
             source: Some(source),
-            // On a plane a squared exponential is more probable, but claims to know more between a few places than it does.
+            // On a plane a squared exponential has more evidence but is overconfident between few positions.
             kernel: Kernel::Matern52,
             smooth_part: share,
             lengths_m: vec![length * length_m; dimensions],
@@ -613,7 +615,7 @@ impl Search<'_> {
             }
         }
         let Some((_, mut prior)) = best else { return Ok(None) };
-        // Noise that the smooth prior took for its own makes a drift look smaller than it is.
+        // Noise absorbed by the smooth prior makes a drift look too small: it is estimated again.
         let few: Vec<Vec<f64>> = sensors_m.iter().step_by(ONE_OF).cloned().collect();
         let mut total = self.total(&prior, &few)?;
         if let Some(drifting) = self.drift(total, &prior, &few)? {
@@ -625,14 +627,14 @@ impl Search<'_> {
         Ok(Some(self.found(prior, &sensors_m)))
     }
 
-    /// The fits under a prior.
+    /// Refines the fits under a prior.
     fn found(&self, prior: Prior, sensors_m: &[Vec<f64>]) -> Found {
         let evidence = Evidence::new(self.presses, &prior, sensors_m);
         let fits = evidence.best_decades(ALL_DECADES).map(|fits| evidence.refined(fits)).unwrap_or_default();
         Found { prior, fits, sensors_m: sensors_m.to_vec() }
     }
 
-    /// Steps along the logarithm of one length scale at a time while the evidence rises.
+    /// Increases the log evidence along the logarithm of one length scale at a time.
     fn climb_lengths(&mut self, mut prior: Prior) -> Result<(f64, Prior), Cancelled> {
         let (shortest_m, longest_m) = (1e-3 * self.extent.length_m(), 10.0 * self.extent.length_m());
         let mut best = self.total(&prior, &[])?;
@@ -650,7 +652,7 @@ impl Search<'_> {
                         }
                         (best, prior) = (total, candidate);
                     }
-                    // The evidence rose all the way: it is less on the way back.
+                    // The evidence rose in this direction: it is less in the opposite one.
                     if prior.lengths_m[k] != from_m {
                         break;
                     }
@@ -661,9 +663,9 @@ impl Search<'_> {
     }
 }
 
-/// Places all over a surface where sensors are looked for.
+/// Candidate sensor positions over the whole surface.
 fn everywhere(extent: Extent) -> Vec<Vec<f64>> {
-    /// Along a line, and along the longer side of a plane.
+    /// Count along a line; below, along the longer side of a plane.
     const ALONG: usize = 600;
     const OF_PLANE: usize = 30;
     let middles =

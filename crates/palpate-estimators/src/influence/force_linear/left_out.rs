@@ -1,9 +1,10 @@
-//! Intervals of few presses, by positions that are left out.
+//! Calibration of intervals from few presses by leave-one-position-out.
 //!
-//! Few presses leave hyperparameters open, such as the places of point sensors, which the posterior takes for known. So each position
-//! is left out in turn, everything is learnt anew, and its presses are located by their readings. With x the press, x̂ the estimate and h the part of its 95 % interval on
-//! the side of x, z = 1.96·(x − x̂)/h is a standard normal variable where intervals are as they should be. ln of the likelihood is divided by the mean of z²,
-//! as that of χ² over its degrees of freedom tells an overdispersion (McCullagh and Nelder, *Generalized Linear Models*, 1989).
+//! The posterior treats hyperparameters as known, though few presses leave them uncertain. Each position is
+//! left out in turn, the rest is learnt, and the omitted presses are located. With press x, estimate x̂ and h
+//! the half-width of the 95 % interval towards x, z = 1.96·(x − x̂)/h is standard normal for calibrated
+//! intervals. The mean of z² divides the log-likelihood, as χ² over its degrees of freedom does for
+//! overdispersion (McCullagh and Nelder, *Generalized Linear Models*, 1989).
 
 use super::presses::FEW;
 use super::{ForceLinearLocator, MOST_PRESSES, fit_condensed};
@@ -15,20 +16,20 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::Cancelled;
 use palpate_numerics::{NORMAL_95, mean};
 
-/// Presses less than [`FEW`] from which on down the weight is 1.
+/// Presses below [`FEW`] where the weight reaches 1.
 const FEWER: f64 = 10.0;
-/// Positions of which one can be left out: of fewer the rest tells next to nothing.
+/// Least number of positions: fewer leave too little to learn from.
 const LEAST: usize = 7;
-/// One press does not count for more, as it may be wrong.
+/// Bound of z², as one press may be an outlier.
 const MOST_SQUARE: f64 = 25.0;
 
-/// Weight of the widening: 1 of few presses, 0 of many.
+/// Weight of the correction: 1 for few presses, 0 for many.
 pub(super) fn weight(presses: usize) -> f64 {
     ((FEW - presses as f64) / FEWER).clamp(0.0, 1.0)
 }
 
-/// The factor by which ln of the likelihood is to be divided further, of a locator that was learnt from so many presses, repeats counted once; `None` where that
-/// cannot be told, or there are many presses. A position is left out with all its presses.
+/// Returns the further divisor of the log-likelihood for a fit of `presses` presses, repeats counted once.
+/// Returns `None` with many presses, too few positions, or without a valid fit of the rest.
 pub(super) fn factor(
     task: FitTask,
     structure: Structure,
@@ -51,7 +52,7 @@ pub(super) fn factor(
         let locator = match fit_condensed(task, structure, MOST_PRESSES) {
             Ok(Some(locator)) => locator,
             Err(error) if Cancelled::caused(&error) => return Err(error),
-            // A rest that nothing can be learnt from says nothing of the intervals of all.
+            // A rest that cannot be learnt carries no information on the intervals.
             Ok(None) | Err(_) => continue,
         };
         let extent = setup.surface().extent();
@@ -60,7 +61,7 @@ pub(super) fn factor(
     Ok((!squares.is_empty()).then(|| 1.0 + weight * (mean(squares) - 1.0).max(0.0)))
 }
 
-/// z² of a press, the mean of both coordinates on a plane; `None` where its reading has no interval, or one of no length.
+/// z² of a press, the mean of both coordinates on a plane; `None` without an interval of positive length.
 fn square(locator: &ForceLinearLocator, row: &Row, extent: Extent) -> Option<f64> {
     let contact = locator.posterior(&row.reading).contact;
     let told = contact.uncertainty?;

@@ -1,4 +1,4 @@
-//! The locator of a force-linear surface: the posterior of a reading over a grid of places, the force integrated in closed form
+//! Locator of a force-linear surface: posterior over a grid of positions, integrated over the force
 //! ([`super::seen`]).
 
 use super::broad_scan::{BroadScan, ChannelAtPlace};
@@ -28,21 +28,21 @@ use palpate_numerics::regression::Kernel;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Learnt functions of the channels in use, over the grid.
+/// Offsets and influence functions of the channels in use, tabulated over the grid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Tables {
     /// Offset of each channel, in its unit.
     offsets: Vec<f64>,
-    /// Standard deviation of the noise σ of each, in its unit.
+    /// Standard deviation σ of each channel's noise, in its unit.
     noise_sd: Vec<f64>,
     /// ω of each channel, over σ².
     offset_variances: Vec<f64>,
-    /// f over σ at each place, per newton: that of channel c at place (x, y) is number (x·count_y + y)·channels + c.
+    /// f over σ at each node, per newton; index (x·count_y + y)·channels + c.
     values: Vec<f64>,
-    /// v over σ² at each place, per newton squared.
+    /// v over σ² at each node, per newton squared.
     variances: Vec<f64>,
-    /// β over σ² at each place, per newton.
+    /// β over σ² at each node, per newton.
     covariances: Vec<f64>,
 }
 
@@ -66,8 +66,8 @@ impl Tables {
         }
     }
 
-    /// True where what the presses leave open of a contact's reading is, all channels together, more than the noise of two, at half of the places or
-    /// more. Elsewhere it does not matter which of it the channels share.
+    /// Returns whether the posterior variance of a contact's reading, summed over channels, exceeds the noise
+    /// variance of two channels at half of the nodes. Otherwise common-mode errors do not matter.
     pub fn are_open(&self, force_n: f64) -> bool {
         const LEAST: f64 = 2.0;
         let open = |variances: &[f64]| force_n * force_n * variances.iter().sum::<f64>();
@@ -76,55 +76,54 @@ impl Tables {
     }
 }
 
-/// The part of a locator that its file holds.
+/// Serialized part of a locator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Stored {
     pub x: Axis,
     pub y: Axis,
-    /// The least and the greatest of each coordinate of the presses, in metres; none in older files.
+    /// Least and greatest coordinates of the presses, in metres; empty in files without them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outermost_m: Vec<(f64, f64)>,
-    /// Channels of a reading, and those of them that are in use, from 0.
+    /// Number of channels of a reading; below, indices of those in use, from 0.
     pub channels: usize,
     pub live: Vec<usize>,
     pub functions: Tables,
-    /// The contact's force in newtons, where it is known.
+    /// Known contact force, in newtons.
     pub known_force_n: Option<f64>,
     /// Mean and standard deviation of φ of the presses, in newtons.
     pub mean_force_n: f64,
     pub force_sd_n: f64,
-    /// φ of the hardest contact, in newtons, where there is no range.
+    /// Largest φ of a contact in newtons, without a range.
     pub hardest_n: f64,
-    /// Range of the forces of contacts; `None` where these are expected to be as hard as the presses, as in files without it.
+    /// Range of contact forces; `None` for a normal prior by the presses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_range: Option<ForceRange>,
-    /// The squared residual, in variances, from which on no contact explains a reading.
+    /// Squared residual, in variances, at which a reading is `outside_model`.
     pub residual_limit: f64,
-    /// The score of a [spread](crate::spread) from which on no contact at a point explains a reading.
+    /// Score at which the [distributed-contact test](crate::spread) rejects a point contact.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spread_limit: Option<f64>,
-    /// The prior that the presses chose.
+    /// Prior selected by the calibration.
     pub prior: Prior,
-    /// Rows of the recording that were set aside, from 0.
+    /// Excluded rows, from 0.
     pub set_aside: Vec<usize>,
-    /// The structure that was asked for.
+    /// Requested structure.
     #[serde(default)]
     pub structure: Structure,
-    /// Number of presses that were learnt from.
+    /// Number of presses of the fit.
     pub presses: usize,
-    /// Degrees of freedom that tell each channel's noise.
+    /// Degrees of freedom of each channel's noise.
     pub noise_freedom: f64,
-    /// Share of untouched readings that may be taken for a contact.
     #[serde(default)]
     pub false_alarm_rate: FalseAlarmRate,
-    /// Channels whose errors count as those of one: the logarithm of the likelihood is divided by it.
+    /// Overdispersion: divisor of the log-likelihood.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub channels_as_one: f64,
-    /// Loading of each channel in use on the errors that all share; none where they are small.
+    /// Loadings of the channels in use on common-mode errors; empty where these are small.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shared_errors: Vec<f64>,
-    /// Change of the offset of each channel in use from the first row of the recording to its last; empty without a drift, and in older files.
+    /// Change of each offset from the first row to the last; empty without drift, and in files without it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub drifts: Vec<f64>,
     /// Saturation of the channels; the functions are those of linearized readings.
@@ -140,7 +139,7 @@ fn is_one(value: &f64) -> bool {
     *value == 1.0
 }
 
-/// Offsets and influence functions of a surface without a model, ready to be inverted.
+/// Locator of a force-linear surface, by tabulated offsets and influence functions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct ForceLinearLocator {
@@ -151,41 +150,42 @@ pub struct ForceLinearLocator {
     pub(super) layers: Layers,
     /// ω.
     pub(super) open: Vec<Lanes>,
-    /// Share of what is open of a channel that is an error of its own, r.
+    /// r: independent fraction of each channel's posterior variance.
     pub(super) own: Vec<Lanes>,
-    /// Loadings on errors that all channels share, u; nothing where they share none.
+    /// u: loadings on common-mode errors; empty without them.
     pub(super) shared: Vec<Lanes>,
-    /// Bounds of what each place costs a reading.
     pub(super) scan: CellScan,
-    /// Greatest distance of the influences of each place from those of its neighbours along and across, per newton and over the noise.
+    /// Greatest distance of each node's influences from its neighbours' along and across, per newton and over
+    /// the noise.
     pub(super) lengths: Vec<[f64; 2]>,
-    /// The largest square of a relative reading of noise alone.
+    /// Critical value of the squared relative reading of noise.
     noise_bound: f64,
-    /// The most that a contact takes off the square of noise alone.
+    /// Critical value of the reduction of this square by the best contact.
     detection_bound: f64,
-    /// True where offsets are known well enough to tell an untouched board from contacts.
+    /// Whether offsets separate an untouched board from contacts.
     tells_untouched: bool,
 }
 
-/// Scatter of presses that grows in proportion to the response to their force, beside the noise.
+/// Scatter of presses in proportion to the response to their force, added to the noise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scatter {
-    /// The root mean square force of the presses, in newtons.
+    /// Root mean square force of the presses, in newtons.
     pub force_n: f64,
-    /// Number of each channel in use, from 0, with the standard deviation of its scatter under this force, in its unit.
+    /// Index of each channel in use, from 0, with its standard deviation of scatter under this force, in its
+    /// unit.
     pub sd: Vec<(usize, f64)>,
 }
 
-/// Costs of the cells of the grid, about, by which minima are searched.
+/// Coarse search over the cells of the grid.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum CellScan {
-    /// Bounds by the variances of the hardest φ.
+    /// Lower bounds, by the variances of the largest φ.
     Bounded(Scan),
-    /// By the variances of each place's own φ.
+    /// Approximate costs, by the variances of each node's own φ.
     Broad(BroadScan),
 }
 
-/// Without a range contacts are expected to have forces that spread this many times as far as those of the presses.
+/// Standard deviation of the normal force prior, over that of the presses.
 const FORCE_SPREAD: f64 = 2.0;
 /// Layers of f, v and β.
 pub(super) const VALUES: usize = 0;
@@ -217,7 +217,7 @@ impl Stored {
         locator
     }
 
-    /// Prior of φ by the range of forces, or by the presses.
+    /// Prior of φ by the range of forces, or by the moments of the presses.
     fn force_prior(&self) -> ForcePrior {
         match self.force_range {
             Some(range) => {
@@ -242,7 +242,7 @@ impl Stored {
         own_shares(&self.shared_errors, self.prior.extent)
     }
 
-    /// Checks what a file may have got wrong.
+    /// Validates the content of a file.
     fn check(&self) -> Result<(), LocatorFault> {
         let numbers = |what, list: &[f64], good: fn(f64) -> bool, bound| {
             LocatorFault::check_numbers(what, list.iter().copied(), good, bound)
@@ -325,7 +325,7 @@ impl From<ForceLinearLocator> for Stored {
     }
 }
 
-/// What the table says of a place.
+/// Table values at a node.
 #[derive(Clone, Copy, Debug)]
 struct Place<'a> {
     /// f, v and β of each channel, over the noise.
@@ -335,7 +335,7 @@ struct Place<'a> {
 }
 
 impl ForceLinearLocator {
-    /// The locator of the same recording with ln of the likelihood of readings divided by a factor more.
+    /// Divides the log-likelihood of readings by a further factor.
     pub(super) fn with_likelihood_divided_by(self, factor: f64, recording: &Recording) -> Self {
         let channels_as_one = factor * self.stored.channels_as_one;
         let open =
@@ -345,7 +345,7 @@ impl ForceLinearLocator {
         locator
     }
 
-    /// The locator of readings that saturate, from that of linearized readings; `channels` are those of the ranges, from 0.
+    /// Adds saturation to a locator of linearized readings; `channels` are those of the ranges, from 0.
     pub(super) fn with_saturation(mut self, saturation: &Saturation, channels: &[usize]) -> Self {
         let range_of = |c: &usize| channels.binary_search(c).map_or(f64::MAX, |i| saturation.ranges[i]);
         let ranges = self.stored.live.iter().map(range_of).collect();
@@ -355,59 +355,59 @@ impl ForceLinearLocator {
         self
     }
 
-    /// The same, whose noise is taken for a contact at another rate.
+    /// Sets the false-alarm rate.
     pub(crate) fn with_false_alarm_rate(mut self, rate: FalseAlarmRate) -> Self {
         self.stored.false_alarm_rate = rate;
         self.bound_noise();
         self
     }
 
-    /// The kernel of the influence functions' smooth part, and its length scale along each coordinate in metres; `None` where they
-    /// have none besides polynomials and point sensors.
+    /// Returns kernel and length scales, in metres, of the smooth part; `None` without one.
     pub fn correlation(&self) -> Option<(Kernel, &[f64])> {
         (self.stored.prior.smooth_part > 0.0)
             .then_some((self.stored.prior.kernel, &self.stored.prior.lengths_m))
     }
 
-    /// Offset of each channel, in its unit; 0 of those that are not in use.
+    /// Returns the offset of each channel, in its unit; 0 for channels not in use.
     pub fn offsets(&self) -> Vec<f64> {
         let mut offsets = vec![0.0; self.stored.channels];
         self.channels().for_each(|(c, offset, _)| offsets[c] = offset);
         offsets
     }
 
-    /// Share of untouched readings that may be taken for a contact.
+    /// Returns the false-alarm rate of untouched readings.
     pub fn false_alarm_rate(&self) -> FalseAlarmRate {
         self.stored.false_alarm_rate
     }
 
-    /// Kind of the point sensors whose places were looked for; nothing where the influences are smooth alone.
+    /// Returns the kind of point sensors; `None` for smooth influences.
     pub fn source(&self) -> Option<Source> {
         self.stored.prior.source
     }
 
-    /// The power of the force that readings follow; 1 where they are linear in it.
+    /// Returns the exponent of the response to force; 1 for a linear response.
     pub fn response(&self) -> f64 {
         self.stored.prior.response
     }
 
-    /// Share by which the largest reading of the presses falls short of proportion to the force; `None` where readings are proportional to it.
+    /// Returns the share by which the largest reading falls short of proportionality; `None` without
+    /// saturation.
     pub fn saturation_share(&self) -> Option<f64> {
         self.stored.saturation.as_ref().map(|saturation| saturation.share)
     }
 
-    /// Drift of each channel in use, from 0: the change of its offset from the first row of the recording to the last, in its unit. Empty without a
-    /// drift, and for a file that does not contain it.
+    /// Returns the drift of each channel in use, from 0: the change of offset from the first row to the last,
+    /// in its unit. Empty without drift, and for files without it.
     pub fn drifts(&self) -> Vec<(usize, f64)> {
         self.stored.live.iter().copied().zip(self.stored.drifts.iter().copied()).collect()
     }
 
-    /// Course of the drift; `None` where the presses do not tell a drift.
+    /// Returns the course of the drift; `None` without drift.
     pub fn drift_course(&self) -> Option<DriftCourse> {
         (self.stored.prior.drift > 0.0).then_some(self.stored.prior.drift_course)
     }
 
-    /// The scatter of presses that grows with their force; `None` where the presses do not tell one.
+    /// Returns the scatter that grows with force; `None` without it.
     pub fn scatter(&self) -> Option<Scatter> {
         let Prior { scatter, force_scale_n, .. } = self.stored.prior;
         let channel = |(c, _, noise): (usize, f64, f64)| (c, scatter.sqrt() * noise);
@@ -415,13 +415,13 @@ impl ForceLinearLocator {
             .then(|| Scatter { force_n: force_scale_n, sd: self.channels().map(channel).collect() })
     }
 
-    /// Length, and width on a plane, of the surface.
+    /// Returns the extent of the surface.
     pub fn extent(&self) -> Extent {
         self.stored.prior.extent
     }
 
-    /// Least and greatest standard deviation of the noise over the grid, over that of an untouched board, and where each is; `None` where it is the
-    /// same everywhere.
+    /// Returns least and greatest noise standard deviation over the grid, relative to an untouched board,
+    /// with positions; `None` for uniform noise.
     pub fn noise_by_place(&self) -> Option<[(f64, Position); 2]> {
         self.stored.prior.noise_by_place.as_ref()?;
         let [x, y] = self.axes();
@@ -435,7 +435,7 @@ impl ForceLinearLocator {
         Some([places().min_by(by_noise)?, places().max_by(by_noise)?])
     }
 
-    /// The structure that was fitted.
+    /// Returns the fitted structure.
     pub fn structure(&self) -> Structure {
         match (&self.stored.saturation, self.response() == 1.0) {
             (Some(_), _) => Structure::ForceSaturating,
@@ -444,34 +444,34 @@ impl ForceLinearLocator {
         }
     }
 
-    /// The structure that was asked for.
+    /// Returns the requested structure.
     pub fn asked_structure(&self) -> Structure {
         self.stored.structure
     }
 
-    /// Rows of the recording, from 0, that were set aside, as no function of the position explains them.
+    /// Returns the excluded rows, from 0.
     pub fn set_aside(&self) -> &[usize] {
         &self.stored.set_aside
     }
 
-    /// Number of presses that were learnt from.
+    /// Returns the number of presses of the fit.
     pub fn presses(&self) -> usize {
         self.stored.presses
     }
 
-    /// True where the noise rests on its prior: too few rows repeat a place or are untouched.
+    /// Returns whether the noise estimate is unreliable: too few repeats and untouched rows.
     pub fn noise_is_hardly_told(&self) -> bool {
         self.stored.noise_freedom <= LEAST_FREEDOM
     }
 
-    /// Number of each channel in use, from 0, with its offset and noise, in its unit.
+    /// Returns index (from 0), offset and noise of each channel in use, in its unit.
     pub fn channels(&self) -> impl Iterator<Item = (usize, f64, f64)> {
         let Tables { offsets, noise_sd, .. } = &self.stored.functions;
         self.stored.live.iter().zip(offsets).zip(noise_sd).map(|((c, offset), noise)| (*c, *offset, *noise))
     }
 
-    /// The influence functions with their uncertainty, at the nodes of the grid. Where the response to the force is not linear, they are
-    /// per newton of the [`response`](Self::response).
+    /// Returns influence functions and standard deviations at the nodes, per newton of the
+    /// [`response`](Self::response).
     pub fn influences_at_nodes(&self) -> InfluencesAtNodes {
         let Tables { offsets, noise_sd, values, variances, .. } = &self.stored.functions;
         let [x, y] = self.axes();
@@ -490,8 +490,8 @@ impl ForceLinearLocator {
         }
     }
 
-    /// The Cramér–Rao bound of its surface, by the influences and the noise that the recording told; beyond the places that were pressed the
-    /// influences stay what they are at the last.
+    /// Returns the Cramér–Rao bound by the fitted influences and noise; influences are constant beyond the
+    /// grid.
     pub fn cramer_rao_bound(&self, extent: Extent) -> CramerRaoBound<'_> {
         let channel = |channel| {
             let response: Arc<dyn ResponseFunction> = Arc::new(LearntResponse { locator: self, channel });
@@ -500,7 +500,7 @@ impl ForceLinearLocator {
         CramerRaoBound::of_responses(extent, (0..self.stored.live.len()).map(channel))
     }
 
-    /// The lightest touch that is distinguished from noise, by its own rule.
+    /// Returns the smallest detectable force by the detection test.
     pub fn lightest_touch(&self) -> LightestTouch<'_> {
         let coordinates = if self.stored.y.count > 1 { 2 } else { 1 };
         let detection = Detection {
@@ -520,7 +520,8 @@ impl ForceLinearLocator {
         LightestTouch::new(detection, self.stored.false_alarm_rate, noise_sds, Box::new(change))
     }
 
-    /// Standard deviation of each channel's noise and offset together; `None` of those that are not in use.
+    /// Returns the standard deviation of each channel's noise and offset together; `None` for channels not in
+    /// use.
     pub fn noise_of_channels(&self) -> Vec<Option<f64>> {
         let Tables { noise_sd, offset_variances, .. } = &self.stored.functions;
         let mut sds = vec![None; self.stored.channels];
@@ -530,7 +531,7 @@ impl ForceLinearLocator {
         sds
     }
 
-    /// The influences at a position, over the noise; beyond the grid those of its edge.
+    /// Influences at a position over the noise, constant beyond the grid.
     fn influences_at(&self, position: Position) -> Vec<f64> {
         let node =
             |axis: Axis, at_m: f64| ((at_m - axis.start) / axis.step).clamp(0.0, (axis.count - 1) as f64);
@@ -560,7 +561,7 @@ impl ForceLinearLocator {
         }
     }
 
-    /// Finds the ways from each place to its neighbours.
+    /// Computes the distances of each node's influences from its neighbours'.
     fn find_lengths(&mut self) {
         let distances =
             |place: usize| greatest_distances(self.axes(), place, |other| self.way_between(place, other));
@@ -571,7 +572,7 @@ impl ForceLinearLocator {
         let live = self.stored.live.len();
         let own = self.stored.own_shares();
         let as_one = self.stored.channels_as_one;
-        // The greatest eigenvalue of the errors' correlation is no more than this.
+        // Bound of the greatest eigenvalue of the errors' correlation.
         let together = 1.0 + self.stored.shared_errors.iter().map(|loading| loading * loading).sum::<f64>();
         let channel = |place: usize, c: usize| {
             let Place { values, variances, covariances } = self.place(place);
@@ -607,13 +608,12 @@ impl ForceLinearLocator {
         }
     }
 
-    /// Places of the grid.
     fn places(&self) -> usize {
         self.stored.x.count * self.stored.y.count
     }
 
-    /// How far, per newton and over the noise, the influences of one place are from those of another; from any multiple of them
-    /// where the force is not known.
+    /// Distance between the influences of two nodes, per newton and over the noise; up to a factor where the
+    /// force is unknown.
     fn way_between(&self, place: usize, other: usize) -> f64 {
         let pairs = || self.place(place).values.iter().zip(self.place(other).values);
         let (fg, gg): (f64, f64) = pairs().fold((0.0, 0.0), |(fg, gg), (f, g)| (fg + f * g, gg + g * g));
@@ -621,8 +621,8 @@ impl ForceLinearLocator {
         pairs().map(|(f, g)| (f - scale * g).powi(2)).sum::<f64>().sqrt()
     }
 
-    /// Whether noise alone explains a relative reading: neither its length nor what the best contact takes off its square is more than
-    /// noise reaches at the false-alarm rate.
+    /// Returns whether the square of a relative reading, and its reduction by the best contact, are below
+    /// their critical values.
     fn is_no_contact(&self, relative: &[f64]) -> bool {
         let open = &self.stored.functions.offset_variances;
         let square: f64 = relative.iter().zip(open).map(|(d, open)| d * d / (1.0 + open)).sum();
@@ -640,14 +640,16 @@ impl ForceLinearLocator {
         (0..self.places()).all(|place| taken(place) <= self.detection_bound)
     }
 
-    /// True where an untouched board is distinguished from contacts half as hard as the presses. Without rows of force 0 few presses may leave the
-    /// offsets so open that the readings of such contacts are within the bounds of noise: then no reading is `no_contact`.
+    /// Returns whether an untouched board is distinguishable from contacts of half the mean calibration
+    /// force.
+    ///
+    /// Without rows of force 0, uncertain offsets may hide such contacts: then no reading is `no_contact`.
     pub fn tells_untouched(&self) -> bool {
         self.tells_untouched
     }
 
-    /// True unless open offsets hide such contacts: at three of four places they are distinguished from noise, or would not be with
-    /// offsets that are known either.
+    /// Returns true unless uncertain offsets hide such contacts at more than a quarter of the nodes where
+    /// exact offsets would not.
     fn offsets_are_told(&self) -> bool {
         const SHARE: f64 = 0.5;
         const HIDDEN: usize = 4;
@@ -663,11 +665,11 @@ impl ForceLinearLocator {
         is_told(&|c| self.stored.functions.offset_variances[c]) || !is_told(&|_| 0.0)
     }
 
-    /// Bounds of noise: of a reading's square, and of what the best contact takes off it.
+    /// Computes the critical values of the detection test.
     fn bound_noise(&mut self) {
         let freedom = self.stored.noise_freedom;
-        // Noise that was learnt from few readings is larger than it seems: a χ² over an estimated variance is an F, whose tail is about
-        // that of χ² at ν·(e^(b/ν) − 1) (Wallace, Ann. Math. Statist. 30, 1959, for t²).
+        // Few degrees of freedom ν underestimate the noise: χ² over an estimated variance is F, with a tail
+        // about that of χ² at ν·(e^(b/ν) − 1) (Wallace, Ann. Math. Statist. 30, 1959, for t²).
         let learnt = |bound: f64, freedom: f64| freedom * ((bound / freedom).exp() - 1.0);
         let live = self.stored.live.len();
         let bounds = NoiseBounds::new(live, self.directions(), self.stored.false_alarm_rate);
@@ -676,7 +678,7 @@ impl ForceLinearLocator {
         self.tells_untouched = self.offsets_are_told();
     }
 
-    /// Extent of the directions that readings of contacts have.
+    /// Extent of the directions of contact readings.
     fn directions(&self) -> Directions {
         let [x, y] = self.axes();
         let direction = |i: usize, j: usize| {
@@ -705,7 +707,7 @@ impl ForceLinearLocator {
         Directions { length: 0.5 * boundary, area }
     }
 
-    /// The reading less the offsets, linearized, over the noise.
+    /// Reading minus the offsets, linearized, over the noise.
     pub(super) fn relative(&self, reading: &[f64]) -> Vec<f64> {
         let Tables { offsets, noise_sd, .. } = &self.stored.functions;
         let deviations = self.stored.live.iter().zip(offsets).map(|(c, offset)| reading[*c] - offset);
@@ -718,12 +720,12 @@ impl ForceLinearLocator {
         }
     }
 
-    /// Variance of the noise: where it was learnt from few readings it may be larger than it seems, as that of Student's t is.
+    /// Variance factor of an estimated noise, as of Student's t: ν/(ν − 2).
     pub(super) fn noise(&self) -> f64 {
         self.stored.noise_freedom / (self.stored.noise_freedom - 2.0)
     }
 
-    /// Variance of the noise at a place of the grid, in nodes, over that of an untouched board.
+    /// Noise variance at grid coordinates, over that of an untouched board.
     pub(super) fn noise_at(&self, [x, y]: [f64; 2]) -> f64 {
         self.noise_at_position(Position { x_m: self.stored.x.value(x), y_m: self.stored.y.value(y) })
     }
@@ -733,7 +735,7 @@ impl ForceLinearLocator {
         prior.noise_at(&[x_m, y_m][..prior.extent.dimensions()])
     }
 
-    /// Place `place` of the grid along and across.
+    /// Grid coordinates of node `place`.
     fn node(&self, place: usize) -> [f64; 2] {
         let across = self.stored.y.count;
         [(place / across) as f64, (place % across) as f64]
@@ -744,14 +746,14 @@ impl ForceLinearLocator {
         self.stored.known_force_n.map(|force_n| self.stored.prior.response_n(force_n))
     }
 
-    /// True for a reading that noise alone explains.
+    /// Returns whether noise alone explains a reading.
     #[cfg(test)]
     pub fn is_noise(&self, reading: &[f64]) -> bool {
         self.is_no_contact(&self.relative(reading))
     }
 }
 
-/// Reading of a channel less its offset, over its noise at the place, as a function of the contact.
+/// Reading of a channel minus its offset, over the local noise, as a function of the contact.
 struct LearntResponse<'a> {
     locator: &'a ForceLinearLocator,
     channel: usize,
@@ -762,7 +764,7 @@ impl LearntResponse<'_> {
         self.locator.influences_at(position)[self.channel]
     }
 
-    /// Standard deviation of the noise at a place over that of an untouched board.
+    /// Noise standard deviation at a position, over that of an untouched board.
     fn noise(&self, position: Position) -> f64 {
         self.locator.noise_at_position(position).sqrt()
     }
@@ -775,7 +777,7 @@ impl ResponseFunction for LearntResponse<'_> {
     }
 
     fn gradient(&self, Contact { position, force_n }: Contact) -> ResponseGradient {
-        /// Half a difference, in steps of the grid.
+        /// Half the difference, in grid steps.
         const REACH: f64 = 0.05;
         let [x, y] = self.locator.axes();
         let response_n = self.locator.stored.prior.response_n(force_n) / self.noise(position);
@@ -802,7 +804,7 @@ impl Locate for ForceLinearLocator {
         let relative = self.relative(reading);
         let mut estimate = self.estimate(&relative);
         if self.is_no_contact(&relative) {
-            // The most probable place of a contact that would be too light to be told from noise.
+            // The most probable contact, though below the detection threshold.
             return Estimate::of_contact(estimate.contact, Status::NoContact);
         }
         self.tell_beyond_presses(&relative, &mut estimate);

@@ -1,4 +1,4 @@
-//! Influence functions that the fits of one task share.
+//! Memo of the influence functions that the fits of one task share.
 
 use super::learning::Learnt;
 use crate::influence::config::Structure;
@@ -9,7 +9,7 @@ use std::fmt;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Influence functions that were learnt during one task. The drift of a recording, its fit and those of its folds need the same ones.
+/// Influence functions learnt during one task, for the drift, the fit and its folds.
 pub(crate) struct LearningMemo<'a> {
     setup: &'a Setup,
     learnt: Mutex<HashMap<Key, Option<Arc<Learnt>>>>,
@@ -27,7 +27,8 @@ impl<'a> LearningMemo<'a> {
         self.setup
     }
 
-    /// Returns the stored functions of a recording, or stores what `learn` returns. Functions of another setup are not stored.
+    /// Returns the stored functions of a recording, or stores the result of `learn`. Functions of another
+    /// setup are not stored.
     pub(super) fn get_or_learn<E>(
         &self,
         (setup, recording): (&Setup, &Recording),
@@ -55,7 +56,7 @@ impl fmt::Debug for LearningMemo<'_> {
     }
 }
 
-/// Hash of all numbers of the rows, of 64 bits: two of a thousand recordings agree with a probability of 3e-14.
+/// 64-bit hash of all numbers of the rows: two of a thousand recordings collide with probability 3e-14.
 fn hash_of_rows(recording: &Recording) -> u64 {
     let mut hasher = DefaultHasher::new();
     for Row { position, force_n, nuisances, time_s, reading } in &recording.rows {

@@ -1,7 +1,8 @@
-//! A surface without a model whose presses have forces: every reading is an offset plus the force times an influence function of
-//! the position, as elastic surfaces are.
+//! Force-linear method for a surface without a model: reading = offset + force · influence function of the
+//! position.
 //!
-//! Learnt from the presses ([`learning`]) and inverted over a grid of places ([`locator`]).
+//! [`learning`] estimates the functions from the calibration; [`locator`] inverts them over a grid of
+//! positions.
 
 mod beyond_presses;
 mod broad_scan;
@@ -51,13 +52,12 @@ use presses::{Presses, Repeats, shares};
 use prior::Prior;
 use saturation_fit::Linearization;
 
-/// Distinct positions without which a reading cannot be a function of anything.
 const LEAST_POSITIONS: usize = 2;
-/// Most nodes along a line, and along either axis of a plane.
+/// Most grid nodes along a line; below, along either axis of a plane.
 const MOST_ALONG: usize = 400;
 const MOST_OF_PLANE: usize = 60;
 
-/// Most nodes of the table over the positions of a surface.
+/// Returns the largest number of grid nodes for a surface.
 pub(crate) const fn most_nodes(extent: Extent) -> usize {
     match extent {
         Extent::Line { .. } => MOST_ALONG,
@@ -65,8 +65,8 @@ pub(crate) const fn most_nodes(extent: Extent) -> usize {
     }
 }
 
-/// Learns the influence functions and offsets of a surface without a model; `None` where the presses do not tell them apart, as
-/// they have no forces or all the same one, and unless the structure is force-linear by demand, where they speak against it.
+/// Fits influence functions and offsets. Returns `None` where forces do not separate influences from offsets,
+/// no channel changes, or [`Structure::Auto`] rejects the force-linear structure.
 pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLinearLocator>, MeasuredError> {
     if structure == Structure::ForceSaturating {
         return fit_saturating(task);
@@ -78,7 +78,7 @@ pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLin
     }))
 }
 
-/// [`fit`] for readings that saturate, by linearized readings.
+/// Fits [`Structure::ForceLinear`] to linearized readings.
 fn fit_saturating(task: FitTask) -> Result<Option<ForceLinearLocator>, MeasuredError> {
     let Some(linearization) = Linearization::new(task)? else { return Ok(None) };
     let task = FitTask { recording: &linearization.recording, ..task };
@@ -86,18 +86,18 @@ fn fit_saturating(task: FitTask) -> Result<Option<ForceLinearLocator>, MeasuredE
     Ok(locator.map(|locator| locator.with_saturation(&linearization.saturation, linearization.channels())))
 }
 
-/// True where the evidence of the presses is largest without a saturation, or they show no influence functions.
+/// Returns whether the log evidence is largest without saturation, or no influence functions can be learnt.
 pub(crate) fn is_unsaturated(task: FitTask) -> Result<bool, MeasuredError> {
     Ok(Linearization::new(task)?.is_none_or(|linearization| linearization.saturation.share == 0.0))
 }
 
-/// True of presses with forces, of which two differ.
+/// Returns whether all rows have forces and two of these differ.
 pub(super) fn has_forces(setup: &Setup, recording: &Recording) -> bool {
     let presses = Presses::of_recording(setup, recording, Repeats::Consecutive, &[]);
     presses.is_some_and(|presses| presses.distinct_forces() >= 2)
 }
 
-/// [`fit`], more presses than `most` condensed to so many.
+/// [`fit`] with the presses condensed to about `most`.
 fn fit_condensed(
     task: FitTask,
     structure: Structure,
@@ -157,17 +157,19 @@ fn fit_condensed(
     Ok(Some(locator))
 }
 
-/// Number of channels whose errors count as those of one: what few presses leave open of influence functions depends on where they are, which
-/// is the same for all channels, and on hyperparameters that all channels share and that few presses hardly tell. The number is that with
-/// which intervals of strips from 5 to 24 presses hold their touches, multiplied by what positions left out of 7 or more show ([`left_out`]). Of 5 and 6 the
-/// variance of the process is widened already, as its size is hardly told.
+/// Returns the divisor of the log-likelihood (overdispersion) for few presses: all channels share
+/// hyperparameters and positions of large posterior variance.
+///
+/// The constants give 95 % coverage on strips with 5 to 24 presses. [`left_out`] multiplies the divisor where
+/// 7 or more positions allow it.
 fn channels_as_one(presses: &Presses) -> f64 {
     const FEWEST: f64 = 4.0;
     const MOST: f64 = 1.8;
     1.0 + left_out::weight(presses.len()) * ((presses.len() as f64 / FEWEST).clamp(1.0, MOST) - 1.0)
 }
 
-/// Offsets at the rows of `asked` by the presses of a recording; `None` where its rows have no times, show no drift, or do not follow the force.
+/// Returns the offsets at the rows of `asked`; `None` where rows lack times, or presses show no drift or no
+/// separable influence functions.
 pub(super) fn offset_course(
     task: FitTask,
     structure: Structure,
@@ -176,7 +178,7 @@ pub(super) fn offset_course(
     let recording = task.recording;
     let Some((own_s, asked_s)) = recording.times_s().zip(asked.times_s()) else { return Ok(None) };
     let Some(learnt) = Learnt::of_task(task, structure, MOST_PRESSES)? else { return Ok(None) };
-    // The order of presses, of their places or of a nuisance coordinate, would pass for a drift.
+    // Without separability, the order of positions or of a nuisance coordinate would pass for drift.
     if !learnt.prior.is_separable() {
         return Ok(None);
     }
@@ -191,12 +193,12 @@ pub(super) fn offset_course(
     Ok(Some(course))
 }
 
-/// The grid: the span of the positions that were pressed and their largest gap beyond.
+/// Returns the grid axes: the span of the calibrated positions, extended by their largest gap.
 fn axes(presses: &Presses, prior: &Prior, extent: Extent) -> [Axis; 2] {
     let positions_m = presses.positions_m();
     let axis = |k: usize, most: usize| {
         let values = positions_m.iter().map(|position_m| position_m[k]).collect();
-        // Beside a point sensor influences bend within no length at all.
+        // The singular part of a point sensor has no length scale.
         let length_m = if prior.source.is_some() { 0.0 } else { prior.lengths_m[k] };
         Axis::of_positions(values, (extent, k), length_m, most)
     };

@@ -1,8 +1,8 @@
-//! Presses that nothing explains.
+//! Outlier test of presses.
 //!
-//! The error of each press, as the others predict it, is taken over a deviation that it has no part in (externally studentized residuals;
-//! Cook and Weisberg, *Residuals and Influence in Regression*, 1982, section 2.2.1). It is an outlier where it is further off than noise is
-//! in one of a hundred recordings.
+//! Externally studentized residuals: the leave-one-out error of a press over a deviation estimated without it
+//! (Cook and Weisberg, *Residuals and Influence in Regression*, 1982, section 2.2.1). The false-alarm rate is
+//! 1 % per recording.
 
 use super::evidence::ChannelFit;
 use super::presses::Presses;
@@ -13,7 +13,7 @@ use ndarray::Zip;
 use palpate_numerics::watch::Watch;
 use palpate_numerics::{NotPositiveDefinite, chi_squared_critical_value};
 
-/// Test of presses for outliers under a prior that was learnt.
+/// Outlier test of presses under a fitted prior.
 pub(super) struct OutlierTest<'a> {
     pub prior: &'a Prior,
     pub fits: &'a [ChannelFit],
@@ -21,8 +21,8 @@ pub(super) struct OutlierTest<'a> {
 }
 
 impl OutlierTest<'_> {
-    /// First rows of the worst outliers among the presses, no more than `at_once`; others may be none without them. `tested` presses are
-    /// tested in all, and told the noise together.
+    /// Returns the first rows of the `at_once` worst outliers. `tested` is the number of presses tested in
+    /// all, with a common noise estimate.
     pub fn worst(
         &self,
         presses: &Presses,
@@ -30,7 +30,7 @@ impl OutlierTest<'_> {
         at_once: usize,
     ) -> Result<Vec<usize>, NotPositiveDefinite> {
         const TAIL: f64 = 1e-2;
-        /// Share of the noise's variance in the error of a press, below which it is not judged.
+        /// Least share of the press's own noise in its error variance.
         const LEAST_TOLD: f64 = 1e-6;
         let n = presses.len();
         let Residuals { squares, told, freedom } =
@@ -42,7 +42,7 @@ impl OutlierTest<'_> {
         let freedom = freedom + tested.saturating_sub(n) as f64;
         let externally = |square: f64, told: f64| {
             let others = (freedom - square).max(1e-3 * freedom);
-            // The others say next to nothing of a press alone at its place.
+            // The others do not predict an isolated press.
             if told < LEAST_TOLD { 0.0 } else { square * (freedom - 1.0) / others }
         };
         let squares = Zip::from(&squares).and(&told).map_collect(|square, told| externally(*square, *told));
@@ -62,11 +62,12 @@ impl OutlierTest<'_> {
         Ok(found.into_iter().take(at_once).map(|i| presses.row[i]).collect())
     }
 
-    /// First rows of the outliers of many presses, each part of them near one another tested by itself until none is left.
+    /// Returns the first rows of outliers among many presses, tested in parts of neighbours until none
+    /// remains.
     pub fn by_parts(&self, presses: &Presses, watch: Watch) -> Result<Vec<usize>, MeasuredError> {
-        /// Presses of a part: the time grows with their square, and those further away tell nothing that these do not.
+        /// Presses of a part: time is quadratic, and distant presses add no information.
         const PART: usize = 100;
-        // Fewer would not tell offset and polynomials.
+        // Fewer positions do not identify offset and polynomials.
         let places = 3 * (1 + self.prior.polynomials());
         let mut outliers = Vec::new();
         for part in presses.parts(PART, places, &self.prior.lengths_m) {

@@ -1,37 +1,39 @@
-//! Noise that differs by place.
+//! Noise that depends on the position.
 
 use crate::fit::LocatorFault;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// A multiplier of the noise's variance, the same for all channels: m(a) = exp(q(a) − q₀), at least 1. With u and v the place as shares of the
-/// span that was pressed, along and across, q is one of [`Shape`]; beyond the span it is that of its edge. q₀ is the least q of the places that were
-/// pressed: where the noise is least, it is what an untouched board has.
+/// Multiplier of the noise variance, common to all channels: m(a) = exp(q(a) − q₀), at least 1.
+///
+/// q has a [`Shape`] in u and v, the position as fractions of the calibrated span along and across; it is
+/// constant beyond. q₀ is the least q of the calibrated positions, where the noise is that of an untouched
+/// board.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PlaceNoise {
-    /// Lowest and highest pressed value of each coordinate, in metres.
+    /// Least and greatest calibrated coordinates, in metres.
     spans_m: Vec<[f64; 2]>,
     shape: Shape,
-    /// θ, by degree, and among those of one from the highest j on.
+    /// θ by ascending degree, then by descending j.
     coefficients: Vec<f64>,
     /// q₀.
     least: f64,
 }
 
-/// Course of ln m over the surface.
+/// Form of ln m over the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub(super) enum Shape {
     /// q = Σ θ_jk·cos(jπu)·cos(kπv), 0 < j + k ≤ degree.
     Smooth { degree: usize },
-    /// q = ½·θ·tanh((u − at)/width), or the same of v: two parts of the surface.
+    /// q = ½·θ·tanh((u − at)/width), or in v: two parts of the surface.
     Step { coordinate: usize, at: f64, width: f64 },
 }
 
 impl Shape {
-    /// Numbers that are looked for.
+    /// Number of estimated parameters.
     pub fn parameters(self, dimensions: usize) -> usize {
         match self {
             Self::Smooth { degree } => terms(dimensions, degree),
@@ -52,7 +54,6 @@ fn terms(dimensions: usize, degree: usize) -> usize {
     if dimensions == 1 { degree } else { (1..=degree).map(|degree| degree + 1).sum() }
 }
 
-/// Lowest and highest value of each coordinate.
 fn spans_m(places_m: &[&[f64]]) -> Vec<[f64; 2]> {
     let dimensions = places_m.first().map_or(1, |place_m| place_m.len());
     let span_m = |k: usize| {
@@ -63,23 +64,24 @@ fn spans_m(places_m: &[&[f64]]) -> Vec<[f64; 2]> {
     (0..dimensions).map(span_m).collect()
 }
 
-/// The highest degree along a line, and on a plane.
+/// Largest degree along a line, and on a plane.
 const MOST_DEGREES: [usize; 2] = [5, 3];
 
 impl PlaceNoise {
-    /// Noise that is the same at all places: θ of 0.
+    /// Creates uniform noise: θ = 0.
     pub fn even(places_m: &[&[f64]], shape: Shape) -> Self {
         let spans_m = spans_m(places_m);
         let coefficients = vec![0.0; shape.coefficients(spans_m.len())];
         Self { spans_m, shape, coefficients, least: 0.0 }
     }
 
-    /// The highest degree that is looked for.
+    /// Largest degree in a number of dimensions.
     pub fn most_degrees(dimensions: usize) -> usize {
         MOST_DEGREES[dimensions - 1]
     }
 
-    /// Steps to look for: between neighbouring coordinates that were pressed, with two on either side, at most so many along each.
+    /// Returns candidate steps between neighbouring coordinates, with at least two on either side, at most
+    /// `most` per axis.
     pub fn steps(places_m: &[&[f64]], most: usize) -> Vec<Shape> {
         let mut steps = Vec::new();
         for (coordinate, [low, high]) in spans_m(places_m).into_iter().enumerate() {
@@ -98,10 +100,10 @@ impl PlaceNoise {
         steps
     }
 
-    /// The same with a step at the quieter end of its gap: nobody pressed where the noise rises, and intervals that are too wide there do less harm than
-    /// ones that are too narrow.
+    /// Moves a step to the quieter end of its gap: noise that is too large there does less harm than too
+    /// small noise.
     pub fn towards_quiet(mut self) -> Self {
-        /// In widths, of which a gap has four.
+        /// In widths; a gap has four.
         const MOVED: f64 = 1.2;
         if let Shape::Step { at, width, .. } = &mut self.shape {
             *at -= MOVED * *width * self.coefficients.first().map_or(0.0, |theta| theta.signum());
@@ -110,7 +112,7 @@ impl PlaceNoise {
         self
     }
 
-    /// Course of ln m.
+    /// Form of ln m.
     pub fn shape(&self) -> Shape {
         self.shape
     }
@@ -120,7 +122,7 @@ impl PlaceNoise {
         &self.coefficients
     }
 
-    /// The same with other θ, or with the first of them of another degree.
+    /// Replaces θ, or the first of them.
     pub fn with_coefficients(&self, places_m: &[&[f64]], coefficients: &[f64]) -> Self {
         let mut changed = Self { least: 0.0, ..self.clone() };
         changed.coefficients.iter_mut().zip(coefficients).for_each(|(own, other)| *own = *other);
@@ -129,12 +131,12 @@ impl PlaceNoise {
         changed
     }
 
-    /// m at a place.
+    /// m at a position.
     pub fn multiplier(&self, place_m: &[f64]) -> f64 {
         (self.exponent(place_m) - self.least).max(0.0).exp()
     }
 
-    /// Slope of ln m of each place by θ, a row a place.
+    /// Derivatives of ln m by θ at `asked_m`, one row per position.
     pub fn slopes(&self, places_m: &[&[f64]], asked_m: &[Vec<f64>]) -> Array2<f64> {
         let terms_at = |place_m: &[f64]| {
             let mut terms = Vec::with_capacity(self.coefficients.len());
@@ -150,14 +152,14 @@ impl PlaceNoise {
         Array2::from_shape_fn((asked_m.len(), quietest.len()), |(i, k)| rows[i][k] - quietest[k])
     }
 
-    /// q at a place.
+    /// q at a position.
     fn exponent(&self, place_m: &[f64]) -> f64 {
         let mut sum = 0.0;
         self.for_terms(place_m, |k, term| sum += self.coefficients[k] * term);
         sum
     }
 
-    /// The cosines at a place, in the order of θ.
+    /// Passes index and basis function of each θ at a position to `take`.
     fn for_terms(&self, place_m: &[f64], mut take: impl FnMut(usize, f64)) {
         let share = |k: usize| {
             let [low, high] = self.spans_m[k];
@@ -188,7 +190,7 @@ impl PlaceNoise {
         degrees.enumerate().for_each(|(term, (j, k))| take(term, along[j] * across[k]));
     }
 
-    /// Checks what a file may have got wrong.
+    /// Validates the content of a file.
     pub fn check(&self, dimensions: usize) -> Result<(), LocatorFault> {
         let numbers = |what, list: &[f64]| {
             LocatorFault::check_numbers(what, list.iter().copied(), |_| true, "a finite number")

@@ -1,9 +1,10 @@
-//! The search for noise that differs by place, by the scoring of residual variances.
+//! Estimate of position-dependent noise by Fisher scoring of squared residuals.
 //!
-//! With t the share of the noise in the error of a press and d its square over the variance, b the slopes of ln m by θ, and both about their
-//! means of each channel, as the channel's noise is learnt as well, the slope of the restricted likelihood is ½·Σ t·b·(d − 1) and its information about
-//! ½·Σ t·b·bᵀ (Smyth, J. R. Statist. Soc. B 51, 1989; Smyth, Huele and Verbyla, Statistical Modelling 1, 2001). Repeats of a press are as many
-//! errors of t = 1 as they have degrees of freedom.
+//! Let t be the share of noise in a press's leave-one-out error, d the squared error over its variance, and b
+//! the derivatives of ln m by θ. Both are relative to their channel means, as the channel's noise is
+//! estimated too. The restricted log-likelihood has the gradient ½·Σ t·b·(d − 1) and about the information
+//! ½·Σ t·b·bᵀ (Smyth, J. R. Statist. Soc. B 51, 1989; Smyth, Huele and Verbyla, Statistical Modelling 1,
+//! 2001). Repeats with ν degrees of freedom count as ν errors of t = 1.
 
 use super::evidence::{ALL_DECADES, ChannelFit, Evidence};
 use super::place_noise::{PlaceNoise, Shape};
@@ -15,12 +16,12 @@ use ndarray::{Array1, Array2};
 use palpate_numerics::Cholesky;
 use palpate_numerics::watch::Watch;
 
-/// Noise that differs by place is believed from this much more evidence on,
+/// Least gain of log evidence for position-dependent noise.
 const LEAST_GAIN: f64 = 10.0;
-/// and each of its parameters from this much.
+/// Least gain of log evidence for each parameter.
 const LEAST_MORE: f64 = 3.0;
 
-/// Presses, with all that was learnt of them but noise that differs by place.
+/// Search for position-dependent noise, with the other hyperparameters given.
 pub(super) struct PlaceNoiseSearch<'a> {
     pub presses: &'a Presses,
     pub prior: &'a Prior,
@@ -28,43 +29,43 @@ pub(super) struct PlaceNoiseSearch<'a> {
     pub watch: Watch<'a>,
 }
 
-/// A prior with the fits and the evidence of all channels.
+/// Prior with fits and log evidence of all channels.
 struct Fitted {
     prior: Prior,
     fits: Vec<ChannelFit>,
     total: f64,
 }
 
-/// Slope and information of the likelihood by θ.
+/// Gradient and information of the log-likelihood by θ.
 struct Score {
     slope: Array1<f64>,
     information: Cholesky,
 }
 
 impl Score {
-    /// The way to the most probable θ were the likelihood a parabola.
+    /// Scoring step of θ.
     fn way(&self) -> Array1<f64> {
         self.information.solve(&self.slope)
     }
 
-    /// Gain of the evidence on it.
+    /// Expected gain of log evidence.
     fn gain(&self) -> f64 {
         0.5 * self.slope.dot(&self.way())
     }
 }
 
 impl PlaceNoiseSearch<'_> {
-    /// The noise that is the most probable, less [`LEAST_MORE`] for each parameter; `None` where that is no more than [`LEAST_GAIN`] above noise
-    /// that is the same everywhere, or grows with the force alone.
+    /// Returns the noise with the largest log evidence minus [`LEAST_MORE`] per parameter. Returns `None`
+    /// without a gain of [`LEAST_GAIN`] over uniform noise and over noise that grows with force alone.
     pub fn found(&self) -> Result<Option<PlaceNoise>, MeasuredError> {
-        /// Steps of the scoring, each with the noise of the channels learnt anew.
+        /// Scoring steps, each with the channels' noise estimated again.
         const STEPS: usize = 4;
-        /// Steps along a coordinate that are looked at, and those of them that are learnt.
+        /// Candidate steps along a coordinate; below, the number that is fitted.
         const MOST_STEPS: usize = 16;
         const BEST_STEPS: usize = 3;
         let places_m = self.presses.positions_m();
         let dimensions = self.prior.extent.dimensions();
-        // Presses that scatter with their force look like noise of the places of hard ones, and that like scatter.
+        // Scatter with force and noise at the positions of large forces resemble each other.
         let even = Prior { scatter: 0.0, ..self.prior.clone() };
         let Some(before) = self.fitted(even, None) else { return Ok(None) };
         let scattered = if self.prior.scatter > 0.0 { self.fitted(self.prior.clone(), None) } else { None };
@@ -81,7 +82,7 @@ impl PlaceNoiseSearch<'_> {
         let mut steps = steps.map(with_gain).collect::<Result<Vec<_>, _>>()?;
         steps.sort_by(|a, b| b.0.total_cmp(&a.0));
         steps.truncate(BEST_STEPS);
-        // Variances that differ much gain more than the parabola says.
+        // Large differences of variance gain more than the quadratic approximation.
         if gains.iter().chain(&steps).all(|(gain, _)| *gain < 0.5 * LEAST_GAIN) {
             return Ok(None);
         }
@@ -118,7 +119,7 @@ impl PlaceNoiseSearch<'_> {
         Ok(best.map(|(_, noise)| noise.towards_quiet()))
     }
 
-    /// The fits under a prior; about those of another one where these are told.
+    /// Fits under a prior, refined around the fits `about` where given.
     fn fitted(&self, prior: Prior, about: Option<&[ChannelFit]>) -> Option<Fitted> {
         let evidence = Evidence::new(self.presses, &prior, self.sensors_m);
         let coarse = match about {
@@ -130,7 +131,7 @@ impl PlaceNoiseSearch<'_> {
         total.is_finite().then_some(Fitted { prior, fits, total })
     }
 
-    /// A step of the scoring; `None` where the presses tell nothing.
+    /// Takes a scoring step; `None` where the fit fails.
     fn step(&self, from: &Fitted, places_m: &[&[f64]]) -> Result<Option<Fitted>, MeasuredError> {
         /// Longest step of a coefficient.
         const LONGEST: f64 = 1.5;
@@ -146,9 +147,9 @@ impl PlaceNoiseSearch<'_> {
         Ok(self.fitted(prior, Some(&from.fits)))
     }
 
-    /// The slope and the information by the θ of a noise, from the errors under a prior.
+    /// Gradient and information by the θ of `noise`, from residuals under a prior.
     fn score(&self, at: &Fitted, residuals: &Residuals, noise: &PlaceNoise) -> Result<Score, MeasuredError> {
-        /// Coefficients are taken to be about 0 with this precision, which errors at few places do not tell.
+        /// Prior precision of θ about 0, for coefficients with little information.
         const PRECISION: f64 = 0.05;
         let Fitted { prior, fits, .. } = at;
         let (presses, repeated) = (self.presses, &self.presses.repeated);

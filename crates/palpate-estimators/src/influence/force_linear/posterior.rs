@@ -1,10 +1,10 @@
-//! Offsets and influence functions at places, given presses and what is taken of the functions beforehand.
+//! Posterior of offsets and influence functions.
 //!
-//! Offset and influences are linear functionals of the process: with k their covariance with the presses, h their share of offset
-//! and polynomials, and the symbols of [`super::evidence`], the mean is hᵀ·β + (L⁻¹·k)ᵀ·w and the variance
-//! k₀ − |L⁻¹·k|² + |R⁻ᵀ·(h − Hᵀ·A⁻¹·k)|², in units of s² (universal kriging; Rasmussen and Williams, eq. 2.41 and 2.42). A source adds its
-//! amplitude times what of its own functional the presses do not tell; the functions of several sources are averaged, and how far
-//! they are apart is variance.
+//! Both are linear functionals of the process. With k their covariance with the presses, h their effects of
+//! offset and polynomials, and the symbols of [`super::evidence`], the mean is hᵀ·β + (L⁻¹·k)ᵀ·w and the
+//! variance k₀ − |L⁻¹·k|² + |R⁻ᵀ·(h − Hᵀ·A⁻¹·k)|², in units of s² (universal kriging; Rasmussen and Williams,
+//! eq. 2.41 and 2.42). A source adds its amplitude times its projected functional. Functions of several
+//! sources are averaged; their differences add variance.
 
 use super::drift::END;
 use super::evidence::{ChannelFit, Evidence, Restricted, SourceFit, WhiteSources};
@@ -15,43 +15,42 @@ use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis as Dimension, s};
 use palpate_numerics::NotPositiveDefinite;
 use palpate_numerics::watch::Watch;
 
-/// Mean of a channel's offset and of its influence at places, and what presses leave open of them.
+/// Posterior moments of a channel's offset and influences.
 #[derive(Clone, Debug)]
 pub(super) struct Functions {
     pub offset: f64,
-    /// f at each place.
+    /// f at each position.
     pub values: Vec<f64>,
     pub offset_variance: f64,
-    /// Variance of f at each place.
+    /// Variance of f at each position.
     pub variances: Vec<f64>,
-    /// Covariance of f at each place with the offset.
+    /// Covariance of f with the offset, at each position.
     pub covariances: Vec<f64>,
 }
 
-/// Channels that share the ratio of noise to signal, and so one factor.
+/// Groups channels of equal ratio ρ, which share one factorization.
 pub(super) fn of_equal_ratio(fits: &[ChannelFit]) -> Vec<Vec<usize>> {
     let mut channels: Vec<usize> = (0..fits.len()).collect();
     channels.sort_by(|a, b| fits[*a].ratio.total_cmp(&fits[*b].ratio));
     channels.chunk_by(|a, b| fits[*a].ratio == fits[*b].ratio).map(<[usize]>::to_vec).collect()
 }
 
-/// A linear functional of a channel's process: the offset at a time, if any, and the influence at a place as often as a response says.
+/// Linear functional of a channel's process: the offset at a time, if any, plus response times influence at a
+/// position.
 struct Functional<'a> {
     time: Option<f64>,
     response: f64,
     place_m: &'a [f64],
 }
 
-/// Functionals that are asked at once.
+/// Functionals per batch.
 const BLOCK: usize = 256;
 
 impl<'a> Functional<'a> {
-    /// The offset at a time.
     fn offset_at(time: f64) -> Self {
         Self { time: Some(time), response: 0.0, place_m: &[] }
     }
 
-    /// The influence at a place, of unit response.
     fn influence(place_m: &'a Vec<f64>) -> Self {
         Self { time: None, response: 1.0, place_m }
     }
@@ -65,7 +64,7 @@ impl<'a> Functional<'a> {
     }
 }
 
-/// Functionals of a channel's process, with their effects and their covariance with the presses.
+/// Functionals with their effects and their covariance with the presses.
 struct Functionals<'a> {
     asked: &'a [Functional<'a>],
     /// h, q × functionals.
@@ -100,7 +99,7 @@ impl<'a> Functionals<'a> {
         Self { asked, effects, covariance, variance }
     }
 
-    /// The functionals of sources of unit amplitude at `sensors_m`, a row a functional.
+    /// Functionals of unit sources at `sensors_m`, one row per functional.
     fn of_sources(&self, prior: &Prior, sensors_m: &[Vec<f64>]) -> Array2<f64> {
         let mut of_sources = Array2::zeros((self.asked.len(), sensors_m.len()));
         for (mut row, Functional { response, place_m, .. }) in of_sources.outer_iter_mut().zip(self.asked) {
@@ -112,7 +111,7 @@ impl<'a> Functionals<'a> {
     }
 }
 
-/// Mean of a functional, its variance, and its covariance with the first of those that were asked with it.
+/// Mean and variance of a functional, and its covariance with the first of the batch.
 #[derive(Clone, Copy, Debug)]
 struct Moments {
     mean: f64,
@@ -120,10 +119,8 @@ struct Moments {
     with_first: f64,
 }
 
-/// Offsets and influences of some channels, which share a ratio, at places; sensors are looked for at `sensors_m` and closer to the
-/// probable ones.
-///
-/// The influences are those of unit response, φ = F̄.
+/// Returns offsets and influences of unit response, φ = F̄, for channels of equal ρ. Sensor positions are
+/// refined around the probable ones of `sensors_m`.
 pub(super) fn functions(
     prior: &Prior,
     presses: &Presses,
@@ -159,7 +156,8 @@ pub(super) fn functions(
     Ok(functions)
 }
 
-/// Mean and variance of what some channels, which share a ratio, read of other presses without noise, each at its own time.
+/// Returns mean and variance of the noiseless readings of `others`, each at its own time, for channels of
+/// equal ρ.
 pub(super) fn readings(
     prior: &Prior,
     presses: &Presses,
@@ -175,7 +173,7 @@ pub(super) fn readings(
     Ok(channels.iter().zip(moments).map(of_channel).collect())
 }
 
-/// Mean and variance of the offset of every channel at each of some times.
+/// Returns mean and variance of every channel's offset at each time.
 pub(super) fn offsets(
     prior: &Prior,
     presses: &Presses,
@@ -198,7 +196,7 @@ pub(super) fn offsets(
     Ok(all)
 }
 
-/// Processes of some channels that share a ratio, as presses tell them.
+/// Posterior of the processes of channels of equal ρ.
 struct Posterior<'a> {
     prior: &'a Prior,
     presses: &'a Presses,
@@ -240,14 +238,14 @@ impl<'a> Posterior<'a> {
     }
 }
 
-/// What presses leave open of functionals beside sources, over s²: the same of all channels.
+/// Posterior variance of functionals without sources, over s², common to all channels.
 struct Within {
     variance: Vec<f64>,
     with_first: Vec<f64>,
 }
 
 impl Within {
-    /// From L⁻¹·k and R⁻ᵀ·(h − Hᵀ·A⁻¹·k), a column a functional.
+    /// Sums the moments from L⁻¹·k and R⁻ᵀ·(h − Hᵀ·A⁻¹·k), one column per functional.
     fn new(asked: &Functionals, [explained, open]: [&Array2<f64>; 2]) -> Self {
         let mut within =
             Self { variance: asked.variance.clone(), with_first: vec![0.0; asked.variance.len()] };
@@ -265,11 +263,11 @@ impl Within {
     }
 }
 
-/// Presses at one ratio of noise to signal.
+/// Presses factored at one ρ.
 struct Known {
     ratio: f64,
     restricted: Restricted,
-    /// M·L⁻¹·y of every channel, and its coefficients of H.
+    /// M·L⁻¹·y of every channel, and the coefficients of H.
     white: Array2<f64>,
     coefficients: Array2<f64>,
 }
@@ -282,12 +280,12 @@ impl Known {
     }
 }
 
-/// Sources at some places, as presses tell them of a channel.
+/// Candidate sources of a channel.
 #[derive(Clone)]
 struct Sources {
     sensors_m: Vec<Vec<f64>>,
     white: WhiteSources,
-    /// Coefficients of H of L⁻¹·u of each source.
+    /// Coefficients of H for L⁻¹·u of each source.
     coefficients: Array2<f64>,
     fits: Vec<SourceFit>,
 }
@@ -307,12 +305,12 @@ impl Sources {
         Self { fits: fit.sources, ..self }
     }
 
-    /// Those of channel `c`, with places close enough together that the presses hardly tell neighbours apart.
+    /// Refines the positions for channel `c` until the presses hardly resolve neighbours.
     fn closer(&self, evidence: &Evidence, known: &Known, c: usize) -> Self {
         const ROUNDS: usize = 4;
-        /// Values of a coordinate among the probable places that are enough.
+        /// Sufficient number of coordinate values among the probable positions.
         const ENOUGH: usize = 12;
-        /// Values of a coordinate that are looked at next, on a line and on a plane.
+        /// Coordinate values of the next round, on a line and on a plane.
         const NEXT: [usize; 2] = [80, 14];
         let mut found = self.clone().fitted(evidence, known, c);
         for _ in 0..ROUNDS {
@@ -335,7 +333,8 @@ impl Sources {
         found
     }
 
-    /// Span of coordinate k of the probable places, a step beyond at either end, and how many values it has there.
+    /// Span of coordinate k of the probable positions, extended by a step at either end, and its number of
+    /// values.
     fn probable(&self, k: usize) -> (f64, f64, usize) {
         let distinct = |mut values: Vec<f64>| {
             values.sort_by(f64::total_cmp);
@@ -352,7 +351,7 @@ impl Sources {
     }
 }
 
-/// A channel of presses with the sources that these tell.
+/// Channel with its sources.
 struct Told {
     c: usize,
     signal: f64,
@@ -374,7 +373,7 @@ impl Told {
             places.dedup();
             places
         };
-        // What of each source the presses do not tell.
+        // Source functionals minus their prediction from the presses.
         let vs = self.sources.white.columns.select(Dimension(1), &used);
         let coefficients = self.sources.coefficients.select(Dimension(1), &used);
         let sensors_m: Vec<Vec<f64>> =
@@ -383,7 +382,7 @@ impl Told {
             - (asked.effects.t().dot(&coefficients) + explained.t().dot(&vs));
         let column = |place: usize| used.binary_search(&place).unwrap_or(0);
         let sources: Vec<_> = self.sources.fits.iter().map(|source| (column(source.place), source)).collect();
-        // Mean over the sources of what they add to functional k.
+        // Mean over the sources of their addition to functional k.
         let shift_of = |k: usize| sources.iter().map(|(j, f)| f.weight * rest[[k, *j]] * f.amplitude).sum();
         let first_shift: f64 = shift_of(0);
         let moments = |k: usize| {

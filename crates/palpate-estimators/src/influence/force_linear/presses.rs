@@ -1,4 +1,4 @@
-//! Presses of recorded force, as the learning of influence functions takes them: repeats averaged, readings about their mean.
+//! Presses: calibration rows of recorded force, with repeats averaged and readings centred.
 
 use crate::recording::{LEAST_FREEDOM, Recording, is_same_force};
 use crate::setup::Setup;
@@ -11,46 +11,45 @@ use std::sync::Arc;
 /// Rows that count as repeats of one press.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Repeats {
-    /// Those of the same position and force that follow each other, which drift has not moved apart.
+    /// Consecutive rows of equal position and force, with little drift between them.
     Consecutive,
-    /// All of the same position and force.
+    /// All rows of equal position and force.
     All,
 }
 
 /// Presses of recorded force.
 #[derive(Clone, Debug)]
 pub(super) struct Presses {
-    /// Position of each, along and, on a plane, across, in metres.
+    /// Position along and, on a plane, across, in metres.
     pub positions_m: Vec<Vec<f64>>,
     pub force_n: Vec<f64>,
-    /// Number of rows that were averaged.
+    /// Number of averaged rows.
     pub count: Vec<f64>,
-    /// When, as a share of the recording: 0 at its first row, 1 at its last.
+    /// Fraction of the recording: 0 at its first row, 1 at its last.
     pub time: Vec<f64>,
-    /// The first row of each, from 0.
+    /// First row of each press, from 0.
     pub row: Vec<usize>,
     /// Mean reading of each channel over the recording.
     pub centre: Vec<f64>,
-    /// Mean reading less the centre, a row a press.
+    /// Mean reading minus the centre, one row per press.
     pub means: Array2<f64>,
-    /// Variance of what rounding does to a reading of each channel, as of converters that count; 0 where it is none that is seen.
+    /// Variance of each channel's rounding error, as of converters; 0 where none is detected.
     pub rounding: Vec<f64>,
-    /// Those of parts of the presses are the same.
+    /// Repeats of the whole recording, also in subsets of presses.
     pub repeated: Arc<Repeated>,
 }
 
-/// Scatter of the presses that were repeated, a row a press.
+/// Scatter of repeated presses, one row per press.
 #[derive(Clone, Debug)]
 pub(super) struct Repeated {
     pub positions_m: Vec<Vec<f64>>,
     pub force_n: Vec<f64>,
-    /// Number of repeats less one.
+    /// Number of repeats minus one.
     pub freedom: Vec<f64>,
-    /// Sum of squared deviations of each channel from the mean of the repeats.
+    /// Squared deviations of each channel from the mean of the repeats.
     pub squares: Array2<f64>,
 }
 
-/// A row of a recording as a press.
 struct RowPress<'a> {
     position_m: Vec<f64>,
     force_n: f64,
@@ -65,11 +64,12 @@ impl RowPress<'_> {
     }
 }
 
-/// Presses of which fewer do not tell noise, offsets and hyperparameters by themselves.
+/// Number of presses below which noise, offsets and hyperparameters need prior information.
 pub const FEW: f64 = 25.0;
 
 impl Presses {
-    /// The presses of a recording but for rows that are set aside, in rising order; `None` where the force of a row is not known.
+    /// Collects the presses of a recording without the rows `set_aside`, ascending; `None` where a row has no
+    /// force.
     pub fn of_recording(
         setup: &Setup,
         recording: &Recording,
@@ -81,7 +81,7 @@ impl Presses {
         let mut rows = Vec::with_capacity(recording.rows.len());
         for (row, found) in recording.rows.iter().enumerate() {
             let force_n = found.force_n.or(setup.force_n()).filter(|force_n| force_n.is_finite())?;
-            // Without a force it does not matter where nothing presses.
+            // Without a force the position does not matter.
             let position_m: Vec<f64> = match force_n {
                 0.0 => vec![0.0; extent.dimensions()],
                 _ => extent.coordinates_m(found.position).collect(),
@@ -137,13 +137,13 @@ impl Presses {
         self.force_n.len()
     }
 
-    /// Weight of what is known beforehand of noise and errors: 1 of few presses, 0 from so many on that they tell these by themselves.
+    /// Weight of the priors of noise and errors: 1 for few presses, 0 for many.
     pub fn fewness(&self) -> f64 {
         const FEWER: f64 = 5.0;
         ((FEW - self.len() as f64) / FEWER).clamp(0.0, 1.0)
     }
 
-    /// Distinct forces, that of no contact among them.
+    /// Number of distinct forces, including 0.
     pub fn distinct_forces(&self) -> usize {
         let mut forces = self.force_n.clone();
         forces.sort_by(f64::total_cmp);
@@ -151,17 +151,18 @@ impl Presses {
         forces.len()
     }
 
-    /// True where presses can tell a drift of the offsets from influences that change along the surface.
+    /// Returns whether drift is identifiable beside influences that change along the surface.
     ///
-    /// Presses of one force that go once along the surface have a time for each place, and what changes with the one changes with the other. They tell it by
-    /// different forces, by untouched rows far apart in time, or where neighbours in place were pressed at different times: where the mean square of the
-    /// steps of the time between neighbours is a good part of twice its variance (von Neumann, Annals of Mathematical Statistics 12, 1941).
+    /// With one force and one pass along the surface, time and position are confounded. Different forces,
+    /// untouched rows far apart in time, or neighbouring positions at different times identify drift. The
+    /// criterion for the last is the mean square of time steps between neighbours over the variance, 2 in
+    /// random order (von Neumann, Annals of Mathematical Statistics 12, 1941).
     pub fn tells_drift(&self) -> bool {
         /// Standard deviation of the forces over their mean.
         const LEAST_FORCES: f64 = 0.1;
-        /// Share of the recording between untouched rows.
+        /// Fraction of the recording between untouched rows.
         const LEAST_SPAN: f64 = 0.5;
-        /// Mean square of the steps over the variance: near 2 in random order.
+        /// Mean square of the steps over the variance.
         const LEAST_STEPS: f64 = 0.5;
         let (untouched, mut pressed): (Vec<usize>, Vec<usize>) =
             (0..self.len()).partition(|i| self.force_n[*i] == 0.0);
@@ -182,7 +183,7 @@ impl Presses {
         pressed.len() > 1 && mean(steps) >= LEAST_STEPS * variance
     }
 
-    /// Distinct positions that were pressed, in rising order.
+    /// Distinct pressed positions, ascending.
     pub fn positions_m(&self) -> Vec<&[f64]> {
         let pressed = self.positions_m.iter().zip(&self.force_n).filter(|(_, force_n)| **force_n != 0.0);
         let mut positions: Vec<&[f64]> = pressed.map(|(position_m, _)| position_m.as_slice()).collect();
@@ -191,19 +192,19 @@ impl Presses {
         positions
     }
 
-    /// Degrees of freedom that tell the noise of a channel: rows less a value for every position and the offset; at least
+    /// Degrees of freedom of a channel's noise: rows minus one per position and one for the offset, at least
     /// [`LEAST_FREEDOM`].
     pub fn noise_freedom(&self) -> f64 {
         let rows = self.count.iter().sum::<f64>();
         (rows - self.positions_m().len() as f64 - 1.0).max(LEAST_FREEDOM)
     }
 
-    /// The greatest force, in newtons.
+    /// Largest force, in newtons.
     pub fn greatest_force_n(&self) -> f64 {
         self.force_n.iter().fold(0.0, |most, force_n| most.max(force_n.abs()))
     }
 
-    /// The channels that change by more than rounding, from 0.
+    /// Channels that change by more than rounding, from 0.
     pub fn changing_channels(&self) -> Vec<usize> {
         let changes = |c: &usize| {
             let most = self.means.column(*c).iter().fold(0.0, |most: f64, value| most.max(value.abs()));
@@ -212,7 +213,7 @@ impl Presses {
         (0..self.centre.len()).filter(changes).collect()
     }
 
-    /// The same of some channels alone.
+    /// Subset of the channels.
     pub fn of_channels(&self, channels: &[usize]) -> Self {
         let of = |values: &[f64]| channels.iter().map(|c| values[*c]).collect();
         Self {
@@ -227,7 +228,7 @@ impl Presses {
         }
     }
 
-    /// Those numbered `kept`.
+    /// Subset of the presses.
     pub fn select(&self, kept: &[usize]) -> Self {
         let of = |values: &[f64]| kept.iter().map(|i| values[*i]).collect();
         Self {
@@ -243,14 +244,14 @@ impl Presses {
         }
     }
 
-    /// No more than `most`, picked evenly in their order.
+    /// Returns at most `most` presses, evenly picked in order.
     pub fn thinned(&self, most: usize) -> Self {
         let kept: Vec<usize> = thinned(self.len(), most).collect();
         self.select(&kept)
     }
 
-    /// Cells of near positions in length scales, no more than `most`, of these presses; each position has one of its own where so many suffice. Presses at the same
-    /// position follow each other in a cell.
+    /// Partitions presses `touched` into at most `most` cells of neighbouring positions, with distances in
+    /// length scales. Presses of one position are consecutive in a cell.
     pub fn cells(&self, touched: &[usize], most: usize, lengths_m: &[f64]) -> Vec<Vec<usize>> {
         let position_m = |i: usize| self.positions_m[i].as_slice();
         let mut touched = touched.to_vec();
@@ -279,14 +280,14 @@ impl Presses {
         cells
     }
 
-    /// Parts of near positions, of about `size` presses each and of `places` positions or more where there are so many, with presses
-    /// without force in all of them.
+    /// Partitions the presses into parts of neighbours, of about `size` presses and at least `places`
+    /// positions where possible. Untouched presses are distributed over the parts.
     pub fn parts(&self, size: usize, places: usize, lengths_m: &[f64]) -> Vec<Vec<usize>> {
         let (untouched, touched): (Vec<usize>, Vec<usize>) =
             (0..self.len()).partition(|i| self.force_n[*i] == 0.0);
         let most = self.len().div_ceil(size).min(self.positions_m().len() / places);
         let cells = self.cells(&touched, most, lengths_m);
-        // Places may have been pressed more often than that; each part has all of a cell.
+        // A cell may be larger; each part has presses from all of it.
         let split = |cell: &Vec<usize>| -> Vec<Vec<usize>> {
             let count = cell.len().div_ceil(2 * size);
             (0..count).map(|k| cell.iter().skip(k).step_by(count).copied().collect()).collect()
@@ -302,30 +303,30 @@ impl Presses {
     }
 }
 
-/// Variance of the error of rounding to a power of ten of which all values are multiples: a twelfth of its square; 0 where there is none.
+/// Variance step²/12 of rounding to the coarsest power of ten that divides all values; 0 without one.
 fn rounding_variance(values: &[f64]) -> f64 {
-    /// The coarsest and the finest power of ten that are looked at.
+    /// Coarsest and finest power of ten of the search.
     const POWERS: std::ops::RangeInclusive<i32> = -9..=6;
-    /// A multiple is one to within so much of the step, or of what a number in binary can hold.
+    /// Tolerance of a multiple, relative to the step or to binary precision.
     const WITHIN: f64 = 1e-6;
     let is_step = |step: &f64| {
         let is_multiple = |value: &f64| {
             let steps = value / step;
             (steps - steps.round()).abs() <= WITHIN && steps.abs() < WITHIN / f64::EPSILON
         };
-        // Of a step far above all values they would all be the multiple 0.
+        // With a step far above all values, each would be the multiple 0.
         values.iter().all(is_multiple) && values.iter().any(|value| (value / step).round() != 0.0)
     };
     POWERS.rev().map(|power| 10f64.powi(power)).find(is_step).map_or(0.0, |step| step * step / 12.0)
 }
 
-/// The time of each row as a share of the recording's; by the rows' order where it has no times.
+/// Times of the rows as fractions of the recording; by row order without times.
 pub(super) fn relative_times(recording: &Recording) -> Vec<f64> {
     let times = recording.times_or_order();
     shares(&times, &times)
 }
 
-/// Times as shares of those of a recording: 0 at its first or before, 1 at its last or later.
+/// Times as fractions of the span of `of`, from 0 to 1.
 pub(super) fn shares(times: &[f64], of: &[f64]) -> Vec<f64> {
     let (first, last) = of
         .iter()
@@ -351,7 +352,7 @@ mod tests {
         of(&[12.0, 7.0, -3.0], 1.0);
         of(&[120.0, 70.0], 10.0);
         of(&[1.25, 3.5, 0.0], 0.01);
-        // Metres: deflections in whole micrometres, and some that no converter has rounded.
+        // Metres: deflections in whole micrometres, and unrounded ones.
         of(&[1.5e-4, 2.53e-4], 1e-6);
         of(&[1.2345678912e-4, 2.5e-4], 0.0);
         of(&[0.0, 0.0], 0.0);

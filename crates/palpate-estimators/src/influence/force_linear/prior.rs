@@ -1,20 +1,20 @@
-//! The prior of influence functions: how they may change along the surface, with the force, and in time.
+//! Prior of influence functions: variation with position, force and time.
 //!
-//! Channel c reads o_c + φ(F)·f_c(a) + drift + noise for the force F at the position a. All channels share the form of
+//! The reading of channel c is o_c + φ(F)·f_c(a) + drift + noise for the force F at the position a, with
 //!
 //! f_c(a) = Σ_j β_cj·h_j(a) + α_c·g(a − p_c) + s_c/F̄·η·z(a),
 //!
-//! - h: polynomials, whose coefficients β are as likely as any others (a constant; where the sensors' places are looked for, all of the third
-//!   degree: a beam between its loads bends as a cubic, a plate as a biharmonic function, which these are);
-//! - g: what a point sensor at the unknown place p_c sees of a load beside it, the singular part of the Green's function
-//!   ([`Source`]), with an amplitude α that is as likely at any order of magnitude;
-//! - z: a Gaussian process of unit variance with a Matérn or squared exponential correlation k, for all that the others are not.
+//! - h: polynomials with flat priors of the coefficients β: a constant; for point sensors, all up to the third
+//!   degree (a beam between loads bends as a cubic, a plate as a biharmonic function, which cubics are);
+//! - g: singular part of the Green's function of a point sensor at the unknown position p_c ([`Source`]), with
+//!   an amplitude α of log-uniform prior;
+//! - z: Gaussian process of unit variance with a Matérn or squared-exponential correlation k.
 //!
-//! φ(F) = F̄·(F/F̄)^γ, F̄ being the root mean square force: γ = 1 but where the presses say that all positions share another
-//! response. A gain that changes with position and force, δ²·k·exp(−(F − F′)²/2F̄²), tells how far the presses are from any of that.
-//! Drift is a Gaussian process of the time for each channel ([`DriftCourse`]), of variance κ times the noise's from one end of the
-//! recording to the other. Noise has the variance σ²·m(a)·(1 + μ·φ²/F̄²): presses scatter with their force where forces or positions were not
-//! quite as recorded, and the noise may differ by place ([`PlaceNoise`]). Without a force it has the variance σ².
+//! φ(F) = F̄·(F/F̄)^γ, with F̄ the root mean square force; γ = 1 unless the evidence supports another response of
+//! all positions. A gain that changes with position and force, δ²·k·exp(−(F − F′)²/2F̄²), measures departures.
+//! Drift of each channel is a Gaussian process of time ([`DriftCourse`]), with the variance κ times the noise's
+//! from the first row to the last. Noise has the variance σ²·m(a)·(1 + μ·φ²/F̄²), and σ² without a force: μ stands
+//! for errors of recorded forces and positions, m for noise that depends on the position ([`PlaceNoise`]).
 
 use super::drift::DriftCourse;
 use super::place_noise::PlaceNoise;
@@ -26,24 +26,25 @@ use palpate_numerics::regression::Kernel;
 use palpate_numerics::root_mean_square;
 use serde::{Deserialize, Serialize};
 
-/// Singular part of the influence function of a point sensor, d being the way from the sensor to the load and L the surface's length.
+/// Singular part of a point sensor's influence function, with d the vector from sensor to load in lengths of
+/// the surface.
 ///
-/// Under a load at a distance |d| a beam's deflection has the part |d|³, its slope d·|d| and its curvature, which strain follows, |d|; a
-/// plate's deflection has d²·ln|d| and its curvature ln|d| (Timoshenko and Woinowsky-Krieger, *Theory of Plates and Shells*, 1959,
-/// article 37).
+/// Under a load at the distance |d|, a beam's deflection has the part |d|³, its slope d·|d| and its curvature
+/// (strain) |d|. A plate's deflection has d²·ln|d| and its curvature ln|d| (Timoshenko and Woinowsky-Krieger,
+/// *Theory of Plates and Shells*, 1959, article 37).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Source {
-    /// Of strain.
+    /// Strain sensor.
     Strain,
-    /// Of slope; along a line only.
+    /// Slope sensor, along a line only.
     Slope,
-    /// Of deflection.
+    /// Deflection sensor.
     Deflection,
 }
 
 impl Source {
-    /// Those of a line, and of a plane.
+    /// Returns the kinds on a line or a plane.
     pub(super) fn all(extent: Extent) -> &'static [Self] {
         match extent {
             Extent::Line { .. } => &[Self::Strain, Self::Slope, Self::Deflection],
@@ -51,9 +52,9 @@ impl Source {
         }
     }
 
-    /// g at a place a load's way from the sensor, in units of the surface's length.
+    /// g at the vector `way` from sensor to load, in lengths of the surface.
     fn singular_part(self, way: &[f64]) -> f64 {
-        /// A sensor has a size, within which a plate's curvature does not grow.
+        /// Size of a sensor, within which a plate's curvature does not grow.
         const SIZE: f64 = 0.01;
         match (self, way) {
             (Self::Strain, [d]) => d.abs(),
@@ -68,7 +69,7 @@ impl Source {
     }
 }
 
-/// The prior that all channels share.
+/// Prior common to all channels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Prior {
@@ -80,9 +81,9 @@ pub(super) struct Prior {
     pub lengths_m: Vec<f64>,
     /// η².
     pub smooth_part: f64,
-    /// Kind of the point sensors whose places are looked for; nothing where the influences are smooth alone.
+    /// Kind of point sensors; `None` for smooth influences.
     pub source: Option<Source>,
-    /// δ: the relative change of an influence with the force.
+    /// δ: relative change of an influence with force.
     pub nonlinearity: f64,
     /// γ.
     pub response: f64,
@@ -93,13 +94,13 @@ pub(super) struct Prior {
     /// μ.
     #[serde(default)]
     pub scatter: f64,
-    /// m; nothing where it is 1 everywhere.
+    /// m; `None` for uniform noise.
     #[serde(default)]
     pub noise_by_place: Option<PlaceNoise>,
 }
 
 impl Prior {
-    /// A smooth function of a quarter of the surface's length, linear in the force, without drift.
+    /// Creates a smooth prior over a quarter of the surface's length, linear in force, without drift.
     pub fn smooth(extent: Extent, presses: &Presses) -> Self {
         let spans_m = [Some(extent.length_m()), extent.width_m()].into_iter().flatten();
         Self {
@@ -118,12 +119,13 @@ impl Prior {
         }
     }
 
-    /// Whether influence functions are one function of the position, whatever the force.
+    /// Returns whether influences are independent of the force.
     pub fn is_separable(&self) -> bool {
         self.nonlinearity == 0.0
     }
 
-    /// True for readings that follow the force: beyond these exponents all forces are alike, or one of them is all there is.
+    /// Returns whether readings follow the force: beyond these exponents all forces are alike, or one
+    /// dominates.
     pub fn has_response(&self) -> bool {
         (0.2..=5.0).contains(&self.response)
     }
@@ -140,7 +142,7 @@ impl Prior {
         if self.response == 1.0 { relative } else { relative.signum() * relative.abs().powf(self.response) }
     }
 
-    /// The force of which φ/F̄ is `response`.
+    /// Force with φ/F̄ = `response`.
     pub fn force_of_relative_response(&self, response: f64) -> f64 {
         self.force_scale_n * response.signum() * response.abs().powf(1.0 / self.response)
     }
@@ -150,7 +152,7 @@ impl Prior {
         self.response_to(force_n) * self.force_scale_n
     }
 
-    /// The force and its variance that belong to φ.
+    /// Force and its variance, from those of φ.
     pub fn force_of_response(&self, response_n: f64, variance_n2: f64) -> (f64, f64) {
         if self.response == 1.0 || response_n <= 0.0 {
             return (response_n, variance_n2);
@@ -160,7 +162,7 @@ impl Prior {
         (force_n, variance_n2 * slope * slope)
     }
 
-    /// Checks what a file may have got wrong.
+    /// Validates the content of a file.
     pub fn check(&self) -> Result<(), LocatorFault> {
         let numbers = |what, list: &[f64], good: fn(f64) -> bool, bound| {
             LocatorFault::check_numbers(what, list.iter().copied(), good, bound)
@@ -179,7 +181,7 @@ impl Prior {
         presses.force_n.iter().map(|force_n| self.response_to(*force_n)).collect()
     }
 
-    /// Covariance of the presses over s², but for noise and drift: n × n.
+    /// Lower triangle of the covariance of the presses over s², without noise and drift: n × n.
     pub fn covariance(&self, presses: &Presses) -> Array2<f64> {
         let n = presses.len();
         let responses = self.responses(presses);
@@ -200,12 +202,12 @@ impl Prior {
         covariance
     }
 
-    /// Variance of the noise of a press over that of an untouched row.
+    /// Noise variance of a press over that of an untouched row.
     pub fn relative_noise(&self, force_n: f64, place_m: &[f64]) -> f64 {
         if force_n == 0.0 { 1.0 } else { self.scatter_of(force_n) * self.noise_at(place_m) }
     }
 
-    /// That of press `i`.
+    /// [`Self::relative_noise`] of press `i`.
     pub fn relative_noise_of(&self, presses: &Presses, i: usize) -> f64 {
         self.relative_noise(presses.force_n[i], &presses.positions_m[i])
     }
@@ -215,23 +217,23 @@ impl Prior {
         1.0 + self.scatter * self.response_to(force_n).powi(2)
     }
 
-    /// m at a place.
+    /// m at a position.
     pub fn noise_at(&self, place_m: &[f64]) -> f64 {
         self.noise_by_place.as_ref().map_or(1.0, |noise| noise.multiplier(place_m))
     }
 
-    /// Covariance of the drift at two times over the noise's variance.
+    /// Covariance of the drift at two times, over the noise variance.
     pub fn drift_between(&self, a: f64, b: f64) -> f64 {
         self.drift * self.drift_course.covariance(a, b)
     }
 
-    /// Covariance of f at a place with the presses, over s² and 1/F̄.
+    /// Covariance of f at a position with the presses, in units of s²/F̄.
     pub fn influence_covariance(&self, presses: &Presses, responses: &[f64], place_m: &[f64]) -> Array1<f64> {
         let positions = presses.positions_m.iter().zip(responses);
         positions.map(|(at_m, phi)| phi * self.smooth_part * self.correlation(place_m, at_m)).collect()
     }
 
-    /// Variance of f at a place over s² and 1/F̄², but for polynomials and source.
+    /// Variance of f in units of s²/F̄², without polynomials and source.
     pub fn influence_variance(&self) -> f64 {
         self.smooth_part
     }
@@ -245,11 +247,11 @@ impl Prior {
         }
     }
 
-    /// h at a place.
+    /// h at a position.
     pub fn polynomials_at(&self, place_m: &[f64]) -> Vec<f64> {
         let unit = |k: usize, size_m: f64| 2.0 * place_m[k] / size_m - 1.0;
         let x = unit(0, self.extent.length_m());
-        // Legendre's, which hardly depend on each other.
+        // Legendre polynomials, which are nearly orthogonal.
         let second = |x: f64| 0.5 * (3.0 * x * x - 1.0);
         let third = |x: f64| 0.5 * x * (5.0 * x * x - 3.0);
         let all = match self.extent.width_m() {
@@ -263,7 +265,7 @@ impl Prior {
         all[..self.polynomials()].to_vec()
     }
 
-    /// H, the readings of presses by an offset and by each polynomial: n × (1 + polynomials).
+    /// H: readings of presses by the offset and each polynomial, n × (1 + polynomials).
     pub fn effects(&self, presses: &Presses) -> Array2<f64> {
         let mut effects = Array2::ones((presses.len(), 1 + self.polynomials()));
         for ((mut row, place_m), phi) in
@@ -274,7 +276,7 @@ impl Prior {
         effects
     }
 
-    /// g at a place for sensors at each of `sensors_m`; nothing without a source.
+    /// g at a position for sensors at `sensors_m`; empty without a source.
     pub fn sources_at(&self, place_m: &[f64], sensors_m: &[Vec<f64>]) -> Array1<f64> {
         let Some(source) = self.source else { return Array1::zeros(0) };
         let scale = 1.0 / self.extent.length_m();
@@ -287,7 +289,7 @@ impl Prior {
         sensors_m.iter().map(at).collect()
     }
 
-    /// Readings of presses by sources at each of `sensors_m`, a column a sensor.
+    /// Readings of presses by sources at `sensors_m`, one column per sensor.
     pub fn sources(&self, presses: &Presses, sensors_m: &[Vec<f64>]) -> Array2<f64> {
         let mut sources =
             Array2::zeros((presses.len(), if self.source.is_some() { sensors_m.len() } else { 0 }));

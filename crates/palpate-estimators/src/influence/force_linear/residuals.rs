@@ -1,7 +1,7 @@
-//! Errors of presses that are predicted from all others.
+//! Leave-one-out residuals of presses.
 //!
-//! Each press is predicted from the others (Rasmussen and Williams, eq. 5.12). With P = Lᵀ⁻¹·M·L⁻¹ the error of press i is
-//! (P·y)_i/P_ii, and its variance s²/P_ii.
+//! With P = Lᵀ⁻¹·M·L⁻¹ the residual of press i is (P·y)_i/P_ii, and its variance s²/P_ii (Rasmussen and
+//! Williams, eq. 5.12).
 
 use super::evidence::{ChannelFit, Evidence};
 use super::posterior::of_equal_ratio;
@@ -10,11 +10,11 @@ use super::prior::Prior;
 use ndarray::{Array1, Array2};
 use palpate_numerics::NotPositiveDefinite;
 
-/// Errors of presses that are predicted from all others, a row a press and a column a channel.
+/// Leave-one-out residuals, one row per press and one column per channel.
 pub(super) struct Residuals {
-    /// Squared errors over what the prior says of their variance.
+    /// Squared residuals over their variance.
     pub squares: Array2<f64>,
-    /// Shares of the noise of the press itself in that variance.
+    /// Fraction of this variance from the press's own noise.
     pub told: Array2<f64>,
     /// Degrees of freedom of a channel.
     pub freedom: f64,
@@ -38,7 +38,7 @@ impl Residuals {
             let ratio = fits[channels[0]].ratio;
             let restricted = evidence.restricted(ratio)?;
             freedom = (n - restricted.effects()) as f64;
-            // (M·L⁻¹)ᵀ, whose squared rows sum to the diagonal of the projected inverse.
+            // (M·L⁻¹)ᵀ: squared rows sum to the diagonal of P.
             let projection = restricted.projection().t().as_standard_layout().into_owned();
             let squared: Array1<f64> = projection.outer_iter().map(|row| row.dot(&row)).collect();
             let (white, _) = restricted.residuals(presses.means.clone());

@@ -1,9 +1,10 @@
-//! Saturation of the channels: readings of hard presses fall short of proportion to the force.
+//! Saturation: readings of large forces fall short of proportionality.
 //!
-//! A deviation x from the offset that is proportional to the force is read as y = x/(1 + s/(1 − s)·|x|/X), the hyperbolic law of a Langmuir
-//! isotherm and of resistive foams. The share s is the amount by which the largest deviation X falls short. With the largest read
-//! deviation Y = (1 − s)·X, the inverse is x = y/(1 − s·|y|/Y). All channels have one s, and each has its own Y, that of the presses. Beyond Y the inverse
-//! continues along its tangent.
+//! A deviation x from the offset, proportional to the force, is read as y = x/(1 + s/(1 − s)·|x|/X), the
+//! hyperbolic law of a Langmuir isotherm and of resistive foams. The share s is the relative shortfall of the
+//! largest deviation X. With the largest read deviation Y = (1 − s)·X, the inverse is x = y/(1 − s·|y|/Y).
+//! All channels share s; each has its own Y, from the presses. Beyond Y the inverse continues along its
+//! tangent.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +19,7 @@ pub(super) struct Saturation {
 }
 
 impl Saturation {
-    /// x of a deviation y of a channel in use.
+    /// Returns x for a deviation y of a channel in use.
     pub fn linearized(&self, channel: usize, deviation: f64) -> f64 {
         let range = self.ranges[channel];
         let within = deviation.abs().min(range);
@@ -26,7 +27,7 @@ impl Saturation {
         deviation.signum() * (linear + (deviation.abs() - within) * self.slope(channel, within))
     }
 
-    /// dx/dy.
+    /// Returns dx/dy.
     pub fn slope(&self, channel: usize, deviation: f64) -> f64 {
         let range = self.ranges[channel];
         (1.0 - self.share * deviation.abs().min(range) / range).powi(-2)

@@ -1,8 +1,8 @@
-//! Estimate of the saturation by presses.
+//! Estimate of the saturation from presses.
 //!
-//! The share s has the largest evidence of the linearized presses, plus the logarithm of the Jacobian, Σ ln(dx/dy) over rows and channels (Box and
-//! Cox, *Journal of the Royal Statistical Society B* 26, 1964). The prior is that of the presses as they are, apart from its
-//! scatter: presses that saturate seem to scatter with their force.
+//! The share s maximizes the log evidence of the linearized presses plus the log Jacobian, Σ ln(dx/dy) over
+//! rows and channels (Box and Cox, *Journal of the Royal Statistical Society B* 26, 1964). The prior is that
+//! of the raw presses, apart from its scatter: saturation resembles scatter with force.
 
 use super::learning::{Learnt, MOST_PRESSES, MOST_SEARCHED};
 use super::presses::relative_times;
@@ -14,7 +14,7 @@ use crate::recording::Recording;
 use crate::thinning::thinned;
 use std::sync::Arc;
 
-/// A recording with readings in proportion to the force.
+/// Recording with linearized readings.
 pub(super) struct Linearization {
     pub recording: Recording,
     pub saturation: Saturation,
@@ -22,7 +22,7 @@ pub(super) struct Linearization {
 }
 
 impl Linearization {
-    /// Estimates the saturation; `None` where the presses show no influence functions.
+    /// Estimates the saturation; `None` where no influence functions can be learnt.
     pub fn new(task: FitTask) -> Result<Option<Self>, MeasuredError> {
         let Some(learnt) = Learnt::of_task(task, Structure::ForceLinear, MOST_PRESSES)? else {
             return Ok(None);
@@ -42,11 +42,12 @@ impl Linearization {
     }
 }
 
-/// The share with the largest log evidence, to 0.6 %.
+/// Maximizes the log evidence over the share, to 0.6 %.
 fn most_likely_share(
     mut log_evidence: impl FnMut(f64) -> Result<f64, MeasuredError>,
 ) -> Result<f64, MeasuredError> {
-    /// Shares of a coarse search, and steps of its refinement. A policy: shares above 0.7 are another response than saturation.
+    /// Shares of a coarse search, and steps of its refinement. Policy: shares above 0.7 are another response
+    /// than saturation.
     const TRIED: [f64; 5] = [0.0, 0.1, 0.2, 0.4, 0.6];
     const STEPS: [f64; 4] = [0.05, 0.025, 0.0125, 0.00625];
     let mut best = (f64::NEG_INFINITY, 0.0);
@@ -70,14 +71,14 @@ fn most_likely_share(
     Ok(best.1)
 }
 
-/// PressDeviations of readings from the offsets of their time.
+/// Deviations of readings from the offsets of their time.
 struct PressDeviations<'a> {
     recording: &'a Recording,
     /// Channels in use, from 0.
     channels: &'a [usize],
     /// Offset of each channel in use at each row.
     offsets: Vec<Vec<f64>>,
-    /// Rows that presses were learnt from.
+    /// Rows of the fit.
     rows: Vec<usize>,
 }
 
@@ -89,7 +90,7 @@ impl<'a> PressDeviations<'a> {
         Ok(Self { recording, channels: &learnt.live, offsets, rows })
     }
 
-    /// Rows of the presses by which hyperparameters are searched: all repeats of each.
+    /// Rows of the presses in the hyperparameter search, with all repeats.
     fn thinned(&self, learnt: &Learnt) -> Self {
         let first_rows = &learnt.pressed.row;
         let kept: Vec<usize> = thinned(first_rows.len(), MOST_SEARCHED).collect();
@@ -103,7 +104,7 @@ impl<'a> PressDeviations<'a> {
         self.recording.rows[row].reading[self.channels[channel]] - self.offsets[channel][row]
     }
 
-    /// The saturation by a share, with the ranges of these rows.
+    /// Saturation for a share, with the ranges of these rows.
     fn saturation(&self, share: f64) -> Saturation {
         let largest = |channel: usize| {
             let sizes = self.rows.iter().map(|row| self.deviation(*row, channel).abs());
@@ -112,7 +113,6 @@ impl<'a> PressDeviations<'a> {
         Saturation { share, ranges: (0..self.channels.len()).map(largest).collect() }
     }
 
-    /// The recording with readings in proportion to the force.
     fn linearized(&self, saturation: &Saturation) -> Recording {
         let mut recording = self.recording.clone();
         for (row, linearized) in recording.rows.iter_mut().enumerate() {
@@ -124,7 +124,7 @@ impl<'a> PressDeviations<'a> {
         recording
     }
 
-    /// Log evidence of these rows, linearized, with the logarithm of the Jacobian.
+    /// Log evidence of these rows, linearized, plus the log Jacobian.
     fn log_evidence(
         &self,
         learnt: &Learnt,

@@ -1,13 +1,13 @@
-//! Lower bounds of what places cost a reading, eight places side by side.
+//! Coarse search by lower bounds of the cost, eight nodes side by side.
 //!
-//! With the weights w of the largest variances that a place's influences may have, the least misfit over forces is
-//! Σ w·d² − (Σ w·f·d)²/Σ w·f²: two products a channel and place. The time is that of reading the table of them once from memory.
+//! With weights w from the largest variances of a node, the least chi-squared over forces is Σ w·d² − (Σ
+//! w·f·d)²/Σ w·f²: two products per channel and node. Reading the table from memory dominates the time.
 
 use crate::influence::inversion::CellBlocks;
 use crate::influence::lanes::{LANES, Lanes};
 use palpate_numerics::simd::Eight;
 
-/// Products of every place, in blocks of eight.
+/// Products of every node, in blocks of eight.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Scan {
     places: usize,
@@ -16,17 +16,17 @@ pub(super) struct Scan {
     weights: Vec<Lanes>,
     /// w·f, channel by channel.
     products: Vec<Lanes>,
-    /// Σ w·f² and the precision that φ is expected with.
+    /// Σ w·f² plus the prior precision of φ.
     squares: Vec<Lanes>,
-    /// The least of the determinant and of the width of φ's density, −2·ln.
+    /// Lower bound of the log determinant and of the width of φ's density, as −2·ln.
     constants: Vec<Lanes>,
-    /// Expected φ and its precision, or the known φ.
+    /// Prior mean and precision of φ; below, the known φ.
     expected: [f64; 2],
     known: Option<f64>,
 }
 
 impl Scan {
-    /// `channel` tells f of a channel at a place, and the least and the greatest variance that its readings may have there.
+    /// `channel` returns f of a channel at a node, with its least and greatest variance.
     pub fn new(
         places: usize,
         channels: usize,
@@ -68,7 +68,7 @@ impl CellBlocks for Scan {
         self.places
     }
 
-    /// The least misfit and cost of each place of a block, and φ there.
+    /// Least chi-squared, cost and φ of each node of a block.
     #[inline(always)]
     fn look<V: Eight>(&self, block: usize, reading: &[f64]) -> [V; 3] {
         let of_block = block * self.channels..(block + 1) * self.channels;

@@ -1,16 +1,16 @@
-//! A reading, as contacts on a force-linear surface explain it.
+//! Likelihood of a reading for contacts on a force-linear surface.
 //!
-//! With d the reading less the offsets and f the influences at a place, both over the noise, channel k errs by
-//! S_k(F) = 1 + r_k·w_k(F), w_k(F) = ω_k + 2F·β_k + F²·v_k: noise, and the variances ω of the offset and v of the influence with their covariance β, as the
-//! presses leave them open. r_k is the share of that which the channel has for itself; g_k = u_k·√w_k are errors that all channels share
-//! ([`super::shared_errors`]). For a force with the [prior](crate::force_prior) p(F),
+//! Let d be the reading minus the offsets and f the influences at a position, both over the noise. Channel k
+//! has the independent variance S_k(F) = 1 + r_k·w_k(F), with w_k(F) = ω_k + 2F·β_k + F²·v_k by the posterior
+//! variances ω of the offset and v of the influence and their covariance β. r_k is the independent share, and
+//! g_k = u_k·√w_k the common-mode error ([`super::shared_errors`]). For a force with the
+//! [prior](crate::force_prior) p(F),
 //!
 //! p(a | d) ∝ ∫ p(F)·|V|^(−½)·exp(−½·(d − F·f)ᵀ·V⁻¹·(d − F·f)) dF, V = diag(S) + g·gᵀ,
 //!
-//! where the noise differs by place its multiplier m(a) in the place of the 1, V taken at a point estimate of the force there. Where the response
-//! to the force is not linear, F stands for φ(F), and the estimate is turned back. The determinant belongs there: between presses, where v
-//! is large, everything would explain a reading otherwise. From few presses ln p is divided by a number of channels whose errors count as
-//! those of one.
+//! with V at a point estimate of the force. Position-dependent noise replaces the 1 by m(a). For a nonlinear
+//! response F stands for φ(F), and the estimate is transformed back. The determinant is needed: otherwise
+//! large v between presses would fit every reading. For few presses the overdispersion divides ln p.
 
 use super::locator::{COVARIANCES, CellScan, ForceLinearLocator, LAYERS, Stored, VALUES, VARIANCES};
 use crate::force_prior::{ForceIntegral, ForceLikelihood};
@@ -27,7 +27,7 @@ use palpate_core::Estimate;
 use palpate_numerics::{SharedError, simd, with_shared_error};
 
 impl ForceLinearLocator {
-    /// A reading, less offsets and over the noise, ready to be explained.
+    /// Prepares a reading, minus offsets and over the noise, for inversion.
     pub(super) fn seen(&self, relative: &[f64]) -> Seen<'_> {
         Seen {
             locator: self,
@@ -40,7 +40,7 @@ impl ForceLinearLocator {
         }
     }
 
-    /// Sets the bound of the residual from the recording's own readings.
+    /// Sets the critical values of residuals from the recording's own readings.
     pub(super) fn limit_residuals(&mut self, recording: &Recording) {
         let freedom = self.stored.live.len().saturating_sub(self.unknowns());
         let normal = [misfit_bound(freedom), spread_bound(self.stored.prior.extent.dimensions())];
@@ -51,36 +51,35 @@ impl ForceLinearLocator {
         (self.stored.residual_limit, self.stored.spread_limit) = (misfit, Some(spread));
     }
 
-    /// Source of the force of an estimate.
+    /// Source of an estimate's force.
     fn told_force(&self) -> ToldForce {
         self.stored.known_force_n.map_or(ToldForce::Estimated, ToldForce::Known)
     }
 
-    /// The estimate of a relative reading.
     pub(super) fn estimate(&self, relative: &[f64]) -> Estimate {
         let Stored { residual_limit, spread_limit, .. } = self.stored;
         let limits = Limits { misfit: residual_limit, spread: spread_limit.unwrap_or(f64::INFINITY) };
         Inversion::new(self.seen(relative)).estimate(self.told_force(), limits)
     }
 
-    /// The estimate of a reading whose intervals are those of the posterior, near the ends too.
+    /// Returns the estimate with posterior intervals, also near the ends.
     pub(super) fn posterior(&self, reading: &[f64]) -> Estimate {
         self.estimate(&self.relative(reading))
     }
 
-    /// The contact of a reading, summed over the whole grid.
+    /// Returns the contact of a reading by summation over the whole grid.
     #[cfg(test)]
     pub fn summed_everywhere(&self, reading: &[f64], per_node: usize) -> palpate_core::ContactEstimate {
         Inversion::new(self.seen(&self.relative(reading))).summed_everywhere(self.told_force(), per_node)
     }
 }
 
-/// A relative reading, and room for what is interpolated to explain it.
+/// Relative reading with buffers for interpolation.
 #[derive(Debug)]
 pub(super) struct Seen<'a> {
     locator: &'a ForceLinearLocator,
     reading: Vec<Lanes>,
-    /// Variance of the noise at the place that is looked at over that of an untouched board.
+    /// Noise variance at the current position, over that of an untouched board.
     noise: f64,
     between: Vec<Lanes>,
     slopes: Vec<Slopes>,
@@ -89,20 +88,20 @@ pub(super) struct Seen<'a> {
     shared: Vec<Lanes>,
 }
 
-/// Sums over the channels of a place, by the variances of one force.
+/// Sums over the channels at a position, with the variances of one force.
 struct WeighChannels<'a, const SHARED: bool> {
     reading: &'a [Lanes],
-    /// f, v and β of the place.
+    /// f, v and β of the position.
     functions: [&'a [Lanes]; LAYERS],
     open: &'a [Lanes],
-    /// r and u, which are read where channels share errors.
+    /// r and u, used with common-mode errors.
     own: &'a [Lanes],
     shared: &'a [Lanes],
     noise: f64,
     force_n: f64,
 }
 
-/// dᵀ·V⁻¹·d, fᵀ·V⁻¹·d, fᵀ·V⁻¹·f and ln|V|, V relative to the noise.
+/// dᵀ·V⁻¹·d, fᵀ·V⁻¹·d, fᵀ·V⁻¹·f and ln|V|, with V relative to the noise.
 #[derive(Clone, Copy, Debug)]
 struct Weighed {
     dd: f64,
@@ -123,7 +122,7 @@ impl<const SHARED: bool> simd::Kernel for WeighChannels<'_, SHARED> {
         let mut sums = [[0.0; LANES]; 3];
         // Σ g·d/S, Σ g·f/S and Σ g²/S.
         let mut with_shared = [[0.0; LANES]; 3];
-        // One logarithm for many channels, but before their product overflows.
+        // One logarithm for many channels, taken ahead of overflow of the product.
         let (mut product, mut log_determinant) = ([1.0; LANES], 0.0);
         for g in 0..reading.len() {
             let (mut spreads, mut weights) = ([0.0; LANES], [0.0; LANES]);
@@ -182,7 +181,7 @@ impl Seen<'_> {
             let channels = WeighChannels::<true> { reading, functions, open, own, shared, noise, force_n };
             simd::run_loops(channels)
         };
-        // Its determinant is relative to the noise of the place.
+        // `log_determinant` is relative to the local noise.
         let of_place = self.locator.stored.live.len() as f64 * self.noise.ln();
         let share = self.locator.stored.channels_as_one.recip();
         Weighed {
@@ -193,7 +192,7 @@ impl Seen<'_> {
         }
     }
 
-    /// Writes d and f of the channels for a contact, whitened; the logarithm of the determinant, less a constant.
+    /// Writes whitened d and f of the channels for a contact; returns the log determinant up to a constant.
     pub(super) fn whiten(&mut self, at: Unknowns, channels: &mut Vec<[f64; 2]>) -> f64 {
         self.weigh(at);
         let ForceLinearLocator { layers, stored, .. } = self.locator;
@@ -212,13 +211,13 @@ impl Seen<'_> {
         log_determinant / stored.channels_as_one
     }
 
-    /// Values of the channels in use over the standard deviations that they have for themselves.
+    /// Values of the channels in use over their independent standard deviations.
     fn over_own(&self, values: impl Iterator<Item = f64>) -> impl Iterator<Item = f64> {
         let weights = self.weights.as_flattened().iter().take(self.locator.stored.live.len());
         weights.zip(values).map(|(weight, value)| weight.sqrt() * value)
     }
 
-    /// The error that channels share, over those that they have for themselves.
+    /// Common-mode error over the independent errors.
     fn shared_error(&self) -> SharedError {
         SharedError::new(self.over_own(self.shared.as_flattened().iter().copied()).collect())
     }
@@ -241,7 +240,7 @@ impl Explain for Seen<'_> {
         }
     }
 
-    /// Of few presses variances change too much from place to place.
+    /// For few presses, variances change too much between nodes.
     fn bounds_are_loose(&self) -> bool {
         !self.locator.shared.is_empty() || self.locator.stored.channels_as_one > 1.0
     }
@@ -250,7 +249,7 @@ impl Explain for Seen<'_> {
         self.locator.lengths[x * self.locator.stored.y.count + y].map(|way| way * response_n.abs())
     }
 
-    /// Of φ.
+    /// Range of φ.
     fn range(&self) -> Option<(f64, f64)> {
         self.locator.known_response_n().is_none().then(|| self.locator.force_prior.ends_n())
     }
@@ -312,7 +311,7 @@ impl Explain for Seen<'_> {
         spread_score(about, reading, reads)
     }
 
-    /// φ is found in steps from about `latent`, each by the variances of the last.
+    /// φ follows by steps from `latent`, each with the variances of the last.
     fn explain(&mut self, place: [f64; 2], latent: f64) -> Explained {
         /// Two steps leave less than a thousandth.
         const STEPS: usize = 2;

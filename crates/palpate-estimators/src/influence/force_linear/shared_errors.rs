@@ -1,16 +1,19 @@
-//! Errors of influence functions that all channels share.
+//! Common-mode errors of influence functions.
 //!
-//! Functions that are learnt at few places are open between the same places in all channels, and sensors of one surface see it bend alike. Channel k
-//! errs by √w_k·(u_k·z + √r_k·e_k) for a contact, w_k being what the presses leave open of its reading, z one standard normal variable of all channels
-//! and e_k one of its own. The loadings u are those of the first principal component of the channels' correlation as their processes have it: with
-//! A the covariance of the presses, K its part without noise and P = A⁻¹ less what offset and polynomials take up, that of
-//! yᵀ·P·K·P·y (Conti and O'Hagan, Journal of Statistical Planning and Inference 140, 2010, for outputs that share a design).
+//! Functions learnt at few positions are uncertain at equal positions in all channels, and sensors of one
+//! surface respond alike. The error of channel k is √w_k·(u_k·z + √r_k·e_k), with w_k the posterior variance
+//! of its reading, z standard normal and common to all channels, and e_k independent. The loadings u are
+//! those of the first principal component of the channels' correlation. With A the covariance of the presses,
+//! K its part without noise and P = A⁻¹ minus the projection on offset and polynomials, it is that of
+//! yᵀ·P·K·P·y (Conti and O'Hagan, Journal of Statistical Planning and Inference 140, 2010, for outputs that
+//! share a design).
 //!
-//! Channels that share nothing have a first component too, the larger the fewer presses: of N channels whose presses leave ν degrees of freedom its
-//! variance is about (1 + √(N/ν))² (Johnstone, Annals of Statistics 29, 2001). No errors are shared where it is not more.
+//! For N independent channels with ν degrees of freedom, the first component has a variance of about (1 +
+//! √(N/ν))² (Johnstone, Annals of Statistics 29, 2001). Below it no common-mode error is modelled.
 //!
-//! Along a line r_k = 1 − u_k². On a plane r_k = 1: beside its sensor an influence has a peak that presses between which it lies do not show, in each
-//! channel by itself. Where the places of point sensors are looked for along a line, these and cubics are most of every function, and no errors are shared.
+//! Along a line r_k = 1 − u_k². On a plane r_k = 1: beside its sensor an influence has a peak that the
+//! presses around it miss, in each channel independently. For point sensors along a line, sources and cubics
+//! make up most of every function, and no common-mode error is modelled.
 
 use super::evidence::{ChannelFit, Evidence};
 use super::presses::Presses;
@@ -19,7 +22,7 @@ use ndarray::Array2;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::{NotPositiveDefinite, median};
 
-/// Loadings u of the channels; none where they share no errors.
+/// Returns the loadings u of the channels; empty without common-mode errors.
 pub(super) fn loadings(
     presses: &Presses,
     prior: &Prior,
@@ -51,19 +54,20 @@ pub(super) fn loadings(
     Ok(if is_common(&loadings, freedom) { loadings } else { Vec::new() })
 }
 
-/// True where a first component of given loadings has more variance than that of channels which share nothing.
+/// Returns whether the first component has more variance than that of independent channels.
 fn is_common(loadings: &[f64], freedom: usize) -> bool {
     let variance: f64 = loadings.iter().map(|loading| loading * loading).sum();
     variance > (1.0 + (loadings.len() as f64 / freedom as f64).sqrt()).powi(2)
 }
 
-/// Loadings of the first principal component of the correlations of given products, by the power method: channels may be hundreds.
+/// Loadings of the first principal component of the correlations, by the power method: channels may be
+/// hundreds.
 fn first_component(products: &Array2<f64>) -> Vec<f64> {
     const ROUNDS: usize = 100;
     let n = products.nrows();
     let root = |i: usize| products[[i, i]].max(f64::MIN_POSITIVE).sqrt();
     let correlation = Array2::from_shape_fn((n, n), |(i, j)| products[[i, j]] / (root(i) * root(j)));
-    // The channel that has most in common with the others is no right angle to it.
+    // The channel of largest correlations is not orthogonal to the first component.
     let common = |i: &usize| correlation.row(*i).mapv(|value| value * value).sum();
     let Some(first) = (0..n).max_by(|a, b| common(a).total_cmp(&common(b))) else { return Vec::new() };
     let mut component = correlation.row(first).to_owned();
@@ -76,7 +80,7 @@ fn first_component(products: &Array2<f64>) -> Vec<f64> {
     component.iter().map(|loading| (loading / value.sqrt()).clamp(-1.0, 1.0)).collect()
 }
 
-/// r of channels with given loadings.
+/// Returns r for given loadings.
 pub(super) fn own_shares(loadings: &[f64], extent: Extent) -> Vec<f64> {
     match extent {
         Extent::Line { .. } => loadings.iter().map(|u| (1.0 - u * u).max(0.0)).collect(),

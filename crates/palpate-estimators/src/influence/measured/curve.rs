@@ -1,8 +1,8 @@
-//! Readings of one place as a curve of the nuisance coordinate: a cubic through the four nodes nearest to where that is about.
+//! Readings at one position as a cubic in the nuisance coordinate, through the four nearest nodes.
 //!
-//! Along the curve the squared residual is a polynomial of the sixth degree, P(τ) = |z − μ(τ)|²/V, of which ten products over the channels tell
-//! everything. Where its minimum τ₀ is clear of the curve's ends, ∫ exp(−P/2) dτ is summed by Gauss and Hermite's rule of five points about the
-//! normal density of mean τ₀ and precision P″/2.
+//! The squared residual along the curve is a polynomial of degree six, P(τ) = |z − μ(τ)|²/V, by ten products
+//! over the channels. Where the minimum τ₀ is far from the ends, five-point Gauss–Hermite quadrature about
+//! the normal density of mean τ₀ and precision P″/2 gives ∫ exp(−P/2) dτ.
 
 use super::line::Marginal;
 use crate::influence::inversion::{FIVE_POINTS, Stencil};
@@ -10,7 +10,7 @@ use crate::influence::lanes::{Lanes, sum_of};
 use palpate_numerics::simd::{Arithmetic, InstructionSet, Kernel, Simd, Vector};
 use std::f64::consts::PI;
 
-/// Nodes that a cubic goes through, of which the first is node `first` of the line.
+/// Nodes of a cubic, from node `first` of the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Window {
     pub first: usize,
@@ -18,30 +18,30 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// Around a place of a line of so many nodes.
+    /// Window around a coordinate of a line of `nodes` nodes.
     pub fn around(node: f64, nodes: usize) -> Self {
         let Stencil { first, used, .. } = Stencil::new(node, nodes);
         Self { first, nodes: used }
     }
 }
 
-/// Standard deviations from an end of the curve beyond which it has no probability worth adding up: e⁻¹⁰.
+/// Standard deviations from an end of the curve where the density is negligible: e⁻¹⁰.
 const CLEAR: f64 = 4.5;
-/// Newton's steps, and the length of the last one in standard deviations.
+/// Most Newton steps; below, the length of the last one in standard deviations.
 const MOST_STEPS: usize = 12;
 const SMALL_STEP: f64 = 1e-3;
 
-/// The squared residual along a curve, over the variances.
+/// Squared residual along a curve, over the variances.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Curve {
     window: Window,
-    /// Coefficients of P, from the constant up, of the way from node `origin` of the line.
+    /// Coefficients of P, from the constant up, in nodes from `origin`.
     powers: [f64; 7],
     origin: f64,
 }
 
 impl Curve {
-    /// The curve through whitened means, those of a window's nodes one after the other; `weights` are 1/V of the channels.
+    /// Builds the curve through the whitened means of a window, node by node; `weights` are 1/V.
     pub fn new(reading: &[Lanes], means: &[Lanes], weights: impl Fn(usize) -> Lanes, window: Window) -> Self {
         let (middle, coefficients) = coefficients(window.nodes);
         let products = InstructionSet::best().run(Products {
@@ -55,7 +55,7 @@ impl Curve {
         Self { window, powers, origin: (window.first + middle) as f64 }
     }
 
-    /// P at a node of the line.
+    /// P at τ.
     fn residual_at(&self, tau: f64) -> f64 {
         self.powers.iter().rev().fold(0.0, |sum, power| sum * tau + power)
     }
@@ -68,7 +68,7 @@ impl Curve {
         [0.5 * slope, 0.5 * bend]
     }
 
-    /// The minimum near a node of the line, or the end that it lies beyond, and the precision there; `None` where the curve bends away.
+    /// Minimum near a node, within the ends, and the precision there; `None` where P is not convex.
     fn minimum(&self, near: f64, ends: [f64; 2]) -> Option<(f64, f64)> {
         let mut tau = (near - self.origin).clamp(ends[0], ends[1]);
         for _ in 0..MOST_STEPS {
@@ -86,8 +86,10 @@ impl Curve {
         None
     }
 
-    /// The least squared residual near a node, and the integral relative to it. Where the curve's ends may matter, the node that the curve
-    /// had better be around, as far as it is known.
+    /// Returns the least squared residual near a node, and the integral relative to it.
+    ///
+    /// # Errors
+    /// Near the curve's ends: the node for the next window, if known.
     pub fn integral(&self, near: f64) -> Result<(f64, Marginal), Option<f64>> {
         let start = self.window.first as f64 - self.origin;
         let end = start + (self.window.nodes - 1) as f64;
@@ -115,7 +117,8 @@ impl Curve {
     }
 }
 
-/// The node that a polynomial through so many nodes is distinguished from, and what its coefficients of τ, τ² and τ³ have of each node.
+/// Reference node of a polynomial through `nodes` nodes, and the weights of each node in the coefficients of
+/// τ, τ² and τ³.
 fn coefficients(nodes: usize) -> (usize, [[f64; 4]; 3]) {
     match nodes {
         1 => (0, [[0.0; 4]; 3]),
@@ -128,7 +131,7 @@ fn coefficients(nodes: usize) -> (usize, [[f64; 4]; 3]) {
     }
 }
 
-/// Products of the residual at the origin and the coefficients of τ, τ² and τ³ over the channels.
+/// Products over the channels of the residual at the origin and the coefficients of τ, τ² and τ³.
 struct Products<'a, W> {
     reading: &'a [Lanes],
     means: &'a [Lanes],
@@ -173,7 +176,6 @@ mod tests {
     const NODES: usize = 9;
     const CHANNELS: usize = 11;
 
-    /// A whitened reading that bends along the line.
     fn mean(channel: usize, node: f64) -> f64 {
         let c = channel as f64;
         20.0 * (0.2 * node + 0.5 * c).sin() + 3.0 * c * node
@@ -183,7 +185,7 @@ mod tests {
         1.0 / (1.0 + 0.3 * channel as f64)
     }
 
-    /// The squared residual of cubic interpolation, channel by channel.
+    /// Squared residual of cubic interpolation, channel by channel.
     fn residual(reading: &[f64], node: f64, window: Window) -> f64 {
         let t = node - window.first as f64;
         let lagrange = |k: usize| -> f64 {
@@ -196,7 +198,7 @@ mod tests {
         (0..CHANNELS).map(channel).sum()
     }
 
-    /// The curve that explains a reading best, found as a locator finds it, of lines of so many nodes.
+    /// Integral near a coordinate of a line of `nodes` nodes.
     fn found(reading: &[f64], near: f64, nodes: usize) -> (Window, Result<(f64, Marginal), Option<f64>>) {
         let window = Window::around(near, nodes);
         let means: Vec<Lanes> = (0..window.nodes)

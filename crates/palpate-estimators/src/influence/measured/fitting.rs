@@ -1,4 +1,4 @@
-//! From a recording to a locator: presses, regression, noise, how far it misses held-out positions, table.
+//! Fit of a measured surface: presses, regression, noise, overdispersion at held-out positions, table.
 
 use super::config::{MeasuredError, MeasuredInfluence, Scale};
 use super::locator::{MeasuredLocator, NuisanceRole, Stored};
@@ -19,19 +19,18 @@ use palpate_numerics::small::Ldl;
 use palpate_numerics::watch::{Cancelled, Watch};
 use std::cmp::Ordering;
 
-/// Distinct positions without which a reading cannot be a function of anything.
 const LEAST_POSITIONS: usize = 2;
-/// Most nodes along a one-dimensional surface, along either axis of a plane, and along the nuisance coordinate.
+/// Most nodes along a line, along either axis of a plane, and along the nuisance coordinate.
 const MOST_ALONG: usize = 400;
 const MOST_OF_PLANE: usize = 80;
 const MOST_OF_NUISANCE: usize = 64;
 const MOST_OF_NUISANCE_OF_PLANE: usize = 16;
-/// Error of a table between its nodes, over the noise, below which it hardly matters.
+/// Tolerated interpolation error of a table, over the noise.
 const MOST_MISSED: f64 = 0.2;
-/// The least variance of noise, over the signal's.
+/// Least noise variance over the signal's.
 const LEAST_NOISE: f64 = 1e-10;
 
-/// Most nodes of a table over the positions of a surface.
+/// Returns the largest number of position nodes of a table.
 pub(crate) const fn most_nodes(extent: Extent) -> usize {
     match extent {
         Extent::Line { .. } => MOST_ALONG,
@@ -39,7 +38,7 @@ pub(crate) const fn most_nodes(extent: Extent) -> usize {
     }
 }
 
-/// Most nodes along the nuisance coordinate of a surface.
+/// Returns the largest number of nuisance nodes of a table.
 pub(crate) const fn most_nuisance_nodes(extent: Extent) -> usize {
     match extent {
         Extent::Line { .. } => MOST_OF_NUISANCE,
@@ -73,7 +72,7 @@ impl Fit for MeasuredInfluence {
             table = presses.table(finer, &process, &whitening, watch)?;
             missed = presses.missed(&table, &process, &whitening);
         }
-        // What the table misses between its nodes is noise to a reading.
+        // Interpolation errors of the table count as noise.
         let factor = missed[0].hypot(missed[1]).hypot(1.0);
         let locator = Stored {
             readings: presses.readings,
@@ -91,7 +90,7 @@ impl Fit for MeasuredInfluence {
 }
 
 impl Presses {
-    /// The whitening by the noise of readings in use, and by the signal of the process.
+    /// Whitening by the noise of readings and the signal of the process.
     fn whitening(
         &self,
         regression: &Regression,
@@ -103,7 +102,7 @@ impl Presses {
             Array2::from_diag(&Array1::from_shape_fn(self.means.ncols(), |j| process.signal_variance(j)));
         let noise = self.noise(process, role)?;
         let known = Whitening::from_covariances(noise.clone(), &signal)?;
-        // What repeats itself at a place, but not at its neighbours, is noise to a contact between them.
+        // Texture that repeats at a position, but not at its neighbours, is noise to a contact between them.
         let factor = misfit(self, regression, process, &known, watch)?.unwrap_or(1.0);
         if self.further.is_empty() {
             return Ok(known.widened(factor));
@@ -114,10 +113,10 @@ impl Presses {
         Ok(Whitening::from_covariances(noise, &(signal * square))?)
     }
 
-    /// Covariance that nuisance coordinates beyond the first give to readings in use, where nobody knows them: Σ s²·J·Jᵀ to first order, s² a
-    /// coordinate's variance and J the slopes by it, on average over the presses.
+    /// Covariance of readings by unknown nuisance coordinates beyond the first: Σ s²·J·Jᵀ to first order,
+    /// averaged over presses, with s² the variance and J the derivatives.
     fn covariance_of_further(&self, process: &GaussianProcess) -> Array2<f64> {
-        /// Presses that are averaged over.
+        /// Most presses of the average.
         const TRIED: usize = 1000;
         let (channels, d) = (process.outputs(), process.coordinates());
         let (mut means, mut gradients) = (vec![0.0; channels], vec![0.0; channels * d]);
@@ -137,12 +136,12 @@ impl Presses {
         sum / count
     }
 
-    /// The noise from repeats, or what the process calls noise where there are too few.
+    /// Noise by repeats, or by the process with too few repeats.
     fn noise(&self, process: &GaussianProcess, role: NuisanceRole) -> Result<Noise, MeasuredError> {
         let channels = self.means.ncols();
         let with_gain = role == NuisanceRole::None && self.readings == Scale::Linear;
         let signal: Array1<f64> = (0..channels).map(|j| process.signal_variance(j)).collect();
-        // A channel that is dead, or never errs, must not make the noise singular.
+        // A missing or error-free channel must not make the noise singular.
         let most = signal.iter().copied().fold(0.0, f64::max);
         let floor: Vec<f64> = signal
             .iter()
@@ -150,7 +149,7 @@ impl Presses {
             .collect();
         let repeats = Noise::of_repeats(&self.places, &self.outputs, &self.means, &floor, with_gain)?;
         let fitted = || {
-            // The process sees means of so many rows.
+            // Outputs of the process are means of this many rows.
             let rows = self.outputs.nrows() as f64 / self.means.nrows() as f64;
             let variances =
                 (0..channels).map(|j| rows * process.noise_variance(j).unwrap_or_default() + floor[j]);
@@ -159,7 +158,7 @@ impl Presses {
         Ok(repeats.unwrap_or_else(fitted))
     }
 
-    /// The process at every node.
+    /// Tabulates the process at every node.
     fn table(
         &self,
         axes: [Axis; 3],
@@ -186,7 +185,8 @@ impl Presses {
         Ok(Table { x, y, nuisance, means, variances })
     }
 
-    /// Coordinates of the process at (x, y, nuisance), in nodes, and at the means of the further nuisance coordinates.
+    /// Coordinates of the process at (x, y, nuisance), in nodes, with further nuisance coordinates at their
+    /// means.
     fn coordinates_at(&self, [x, y, nuisance]: [Axis; 3], at: [f64; 3]) -> Vec<f64> {
         let mut coordinates = vec![x.value(at[0])];
         coordinates.extend((self.dimensions() == 2).then(|| y.value(at[1])));
@@ -195,9 +195,9 @@ impl Presses {
         coordinates
     }
 
-    /// Error of a channel of a table, over the noise: in the middle between places, and between nodes of the nuisance coordinate.
+    /// Interpolation error of a table over the noise: between positions, and between nuisance nodes.
     fn missed(&self, table: &Table, process: &GaussianProcess, whitening: &Whitening) -> [f64; 2] {
-        /// Places that are tried.
+        /// Most nodes of the check.
         const TRIED: usize = 300;
         let Table { x, y, nuisance, .. } = table;
         let channels = whitening.channels();
@@ -229,8 +229,8 @@ impl Presses {
         squares.map(|square| (square / count).sqrt())
     }
 
-    /// Axes with so many more nodes that a table misses less, as far as there may be so many: cubic interpolation errs as the fourth power of
-    /// the distance between nodes.
+    /// Refines axes by the interpolation error, of fourth order in the distance between nodes, up to the
+    /// largest counts.
     fn finer(&self, [x, y, nuisance]: [Axis; 3], missed: [f64; 2]) -> [Axis; 3] {
         let is_plane = y.count > 1;
         let (most, most_nuisance) = if is_plane {
@@ -258,7 +258,7 @@ impl Presses {
     }
 }
 
-/// The squared residual beyond which no contact explains a reading.
+/// Critical value of the squared residual.
 fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
     let table = locator.table();
     let fitted = [table.x, table.y, table.nuisance].iter().filter(|axis| axis.count > 1).count();
@@ -267,19 +267,20 @@ fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
     limit
 }
 
-/// Distinct positions from which on every fifth is held out at once; of fewer each but the first and the last in their order by itself, so that enough is left to learn from.
+/// Positions from which every fifth is held out at once; with fewer, each inner position in turn.
 const MANY_TO_JUDGE: usize = 15;
-/// Distinct positions of which one can be held out.
+/// Least positions for hold-out.
 const LEAST_TO_JUDGE: usize = 5;
-/// The least and the greatest factor that is believed: with fewer rows to learn from, a factor below 1 says little.
+/// Range of the factor: with fewer rows to learn from, a factor below 1 is unreliable.
 const FACTORS: (f64, f64) = (1.0, 5.0);
 
-/// By what factor position errors at positions that were not learnt exceed what noise and process say, as a deviation:
-/// every fifth position is held out of the same process, or of few each in turn. `None` with too few positions to tell.
+/// Returns the overdispersion of position errors at held-out positions, as a standard-deviation factor;
+/// `None` with too few positions.
 ///
-/// It is what the smoothness that the process found does not know of: texture that repeats itself, presses a little
-/// off. For a residual r with covariance V, and the slopes J of the mean by position and nuisance coordinate, the error is
-/// δ = (Jᵀ·V⁻¹·J)⁻¹·Jᵀ·V⁻¹·r, its covariance (Jᵀ·V⁻¹·J)⁻¹, and the factor the root mean square of their positions' part.
+/// It covers departures from the smooth process, such as repeated texture or misplaced presses. For a
+/// residual r with covariance V, and J the derivatives of the mean by position and nuisance coordinate, the
+/// error is δ = (Jᵀ·V⁻¹·J)⁻¹·Jᵀ·V⁻¹·r with covariance (Jᵀ·V⁻¹·J)⁻¹. The factor is the root mean square of the
+/// standardized position errors.
 pub(super) fn misfit(
     presses: &Presses,
     regression: &Regression,
@@ -315,7 +316,7 @@ pub(super) fn misfit(
     Ok(factor.is_finite().then(|| factor.clamp(FACTORS.0, FACTORS.1)))
 }
 
-/// The presses that are held out, true in their places, for every time that some are.
+/// Flags of held-out presses, one list per fold.
 fn held_out(presses: &Presses, dimensions: usize) -> Vec<Vec<bool>> {
     let places: Vec<Vec<f64>> =
         presses.coordinates.outer_iter().map(|at| at.slice(s![..dimensions]).to_vec()).collect();
@@ -335,18 +336,18 @@ fn held_out(presses: &Presses, dimensions: usize) -> Vec<Vec<bool>> {
     }
 }
 
-/// Prediction of the process at a place, whitened.
+/// Whitened prediction of the process at a position.
 #[derive(Clone, Debug)]
 struct Prediction {
     mean: Vec<f64>,
-    /// J, one column a coordinate: at most x, y and the nuisance coordinate.
+    /// J, one column per coordinate: at most x, y and the nuisance coordinate.
     slopes: Vec<Vec<f64>>,
     /// v.
     variance: f64,
 }
 
 impl Prediction {
-    /// The slopes are by the first `searched` coordinates, the others being known.
+    /// Computes slopes by the first `searched` coordinates; the others are known.
     fn new(process: &GaussianProcess, at: &[f64], searched: usize, whitening: &Whitening) -> Self {
         let (channels, d) = (process.outputs(), process.coordinates());
         let (raw, variances) = process.predict(at);
@@ -363,7 +364,7 @@ impl Prediction {
         Self { mean: white(&raw), slopes: (0..searched).map(slope).collect(), variance }
     }
 
-    /// The squared standardized position error of a reading; `None` where the slopes tell no position.
+    /// Squared standardized position error of a reading; `None` where the position is unidentifiable.
     fn score(&self, output: &[f64], whitening: &Whitening, dimensions: usize) -> Option<f64> {
         let mut residual = vec![0.0; output.len()];
         whitening.apply(output, &mut residual);
@@ -381,7 +382,7 @@ impl Prediction {
         score.is_finite().then_some(score)
     }
 
-    /// aᵀ·V⁻¹·b, V = I + v·diag(d) + γ²·μ·μᵀ.
+    /// aᵀ·V⁻¹·b, with V = I + v·diag(d) + γ²·μ·μᵀ.
     fn product(&self, a: &[f64], b: &[f64], whitening: &Whitening) -> f64 {
         let diagonal = |a: &[f64], b: &[f64]| -> f64 {
             let products = a.iter().zip(b).zip(&whitening.signal);

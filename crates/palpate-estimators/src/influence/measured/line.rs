@@ -1,7 +1,7 @@
-//! Readings of one place along the nuisance coordinate, in straight parts, and the integral of their probability.
+//! Integration over the nuisance coordinate at one position, in straight segments.
 //!
-//! Along a straight part the integral is that of a normal density along a straight line through the space of readings: a density across it
-//! times a share along it.
+//! The integrand on a segment is a normal density along a straight line through the space of readings: a
+//! density across it times a probability along it.
 
 use crate::influence::lanes::{Lanes, in_lanes, sum_of};
 use crate::influence::noise::Whitening;
@@ -9,7 +9,7 @@ use palpate_numerics::normal_between;
 use palpate_numerics::simd::{Arithmetic, InstructionSet, Kernel, Simd, Vector};
 use std::f64::consts::PI;
 
-/// Nodes of one place along the nuisance coordinate.
+/// Nodes of one position along the nuisance coordinate.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line<'a> {
     /// Whitened means, eight channels side by side, node by node.
@@ -21,9 +21,9 @@ pub(super) struct Line<'a> {
 /// Noise of whitened channels, eight side by side.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct WhiteNoise {
-    /// d: the signal's variance over the noise's.
+    /// d: signal variance over noise variance.
     pub signal: Vec<Lanes>,
-    /// γ: the deviation of a gain that all channels share.
+    /// γ: standard deviation of a common gain error.
     pub gain: f64,
 }
 
@@ -32,18 +32,18 @@ impl WhiteNoise {
         Self { signal: in_lanes(&whitening.signal), gain: whitening.gain }
     }
 
-    /// 1/V of the channels of a group, v being the process's variance over its signal's.
+    /// 1/V of a group of channels, with v the process variance over the signal's.
     pub fn weights(&self, v: f64, group: usize) -> Lanes {
         self.signal[group].map(|signal| 1.0 / (1.0 + v * signal))
     }
 
-    /// The same where no gain scatters.
+    /// Removes the gain error.
     pub fn without_gain(&self) -> Self {
         Self { signal: self.signal.clone(), gain: 0.0 }
     }
 }
 
-/// Probability of a place: the likelihood integrated over the nuisance coordinate.
+/// Likelihood of a position integrated over the nuisance coordinate.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Marginal {
     /// ∫ exp(−(residual − reference)/2), over the nuisance coordinate in nodes.
@@ -53,9 +53,8 @@ pub(super) struct Marginal {
     pub variance: f64,
 }
 
-/// A stretch between two nodes, as seen from a reading.
-///
-/// With a = z − μ₀ and d = μ₁ − μ₀, both divided by the standard deviations: |a − s·d|² for s from 0 to 1.
+/// Segment between two nodes: |a − s·d|² for s from 0 to 1, with a = z − μ₀ and d = μ₁ − μ₀ over the standard
+/// deviations.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stretch {
     /// |a|², a·d, |d|².
@@ -65,8 +64,7 @@ pub(super) struct Stretch {
 }
 
 impl Line<'_> {
-    /// The least squared residual of the whitened reading, over the variance of noise and process, and the integral over the
-    /// nuisance coordinate relative to the likelihood of that residual.
+    /// Returns the least squared residual of a whitened reading, and the integral relative to its likelihood.
     pub fn explain(
         self,
         reading: &[Lanes],
@@ -86,7 +84,7 @@ impl Line<'_> {
         (least, Marginal { weight, mean, variance: (second / weight - mean * mean).max(0.0) })
     }
 
-    /// The least squared residual; `stretches` become those of the line.
+    /// Returns the least squared residual, and writes the line's segments to `stretches`.
     pub fn residual(self, reading: &[Lanes], noise: &WhiteNoise, stretches: &mut Vec<Stretch>) -> f64 {
         InstructionSet::best().run(FindStretches {
             line: self,
@@ -101,7 +99,7 @@ impl Line<'_> {
     }
 }
 
-/// Finds the stretches from each node of a line to the next; one of no length where there is a single node.
+/// Computes the segments between consecutive nodes; one of zero length for a single node.
 struct FindStretches<'a> {
     line: Line<'a>,
     reading: &'a [Lanes],
@@ -140,23 +138,23 @@ impl Kernel for FindStretches<'_> {
     }
 }
 
-/// Contribution of a stretch to the integral.
+/// Contribution of a segment to the integral.
 #[derive(Clone, Copy, Debug)]
 struct Share {
     weight: f64,
-    /// Mean and variance of s there.
+    /// Mean and variance of s.
     middle: f64,
     spread: f64,
 }
 
-/// Beyond this many halved squares below the reference a stretch has no weight.
+/// Excess squared residual beyond which a segment is negligible.
 const NEGLIGIBLE: f64 = 60.0;
-/// A stretch shorter than this has the same likelihood all along.
+/// Length below which the likelihood is constant along a segment.
 const SHORT: f64 = 1e-4;
 
 impl Stretch {
-    /// With a gain that scatters by γ about 1: the covariance grows by γ²·μ·μᵀ, so with V the variances,
-    /// |a|² becomes |a|² − γ²·(μᵀ·V⁻¹·a)²/(1 + γ²·μᵀ·V⁻¹·μ) (Sherman and Morrison). For a stretch of no length only.
+    /// Adds a gain error of standard deviation γ to the covariance: |a|² becomes |a|² − γ²·(μᵀ·V⁻¹·a)²/(1 +
+    /// γ²·μᵀ·V⁻¹·μ) (Sherman and Morrison). Valid for zero length only.
     fn explain_by_gain(&mut self, reading: &[Lanes], line: Line, noise: &WhiteNoise) {
         let (mut mm, mut ma) = (0.0, 0.0);
         let channels = reading.as_flattened().iter().zip(line.means.as_flattened());
@@ -169,12 +167,12 @@ impl Stretch {
         self.aa = (self.aa - gain2 * ma * ma / (1.0 + gain2 * mm)).max(0.0);
     }
 
-    /// The s of the least residual.
+    /// s of the least residual.
     fn foot(self) -> f64 {
         if self.dd > 0.0 { (self.ad / self.dd).clamp(0.0, 1.0) } else { 0.0 }
     }
 
-    /// The squared residual at s.
+    /// Squared residual at s.
     pub fn residual_at(self, s: f64) -> f64 {
         (self.aa - 2.0 * s * self.ad + s * s * self.dd).max(0.0)
     }
@@ -191,7 +189,8 @@ impl Stretch {
         if length < SHORT {
             return Share { weight: scale(least), middle: 0.5, spread: 1.0 / 12.0 };
         }
-        // Across: the residual that no s takes away. Along: a normal density of mean s₀ and deviation 1/length.
+        // Across: residual perpendicular to the segment. Along: a normal density of mean s₀ and standard
+        // deviation 1/length.
         let middle = self.ad / self.dd;
         let across = (self.aa - self.ad * middle).max(0.0);
         let (from, to) = (-middle * length, (1.0 - middle) * length);

@@ -1,4 +1,4 @@
-//! The locator of a measured surface: its table, and what the places and nuisance coordinates of the table explain of a reading.
+//! Locator of a measured surface: inversion of its table over position and nuisance coordinate.
 
 use super::config::Scale;
 use super::curve::{Curve, Window};
@@ -22,35 +22,30 @@ use palpate_numerics::simd::{Arithmetic, InstructionSet, Kernel, Simd, Vector};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NuisanceRole {
-    /// Nothing: the reading depends on the position alone.
+    /// Absent: readings depend on the position alone.
     None,
-    /// The contact force in newtons, which the estimate then tells.
+    /// Contact force in newtons, part of the estimate.
     Force,
-    /// Something else.
+    /// Another quantity.
     Other,
 }
 
-/// The part of a locator that its file holds.
+/// Serialized part of a locator.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Stored {
-    /// On which scale readings are compared.
     pub readings: Scale,
-    /// Whitening of scaled readings to channels of unit noise.
     pub whitening: Whitening,
-    /// The learnt readings.
     pub table: Table,
-    /// Role of the nuisance coordinate.
     pub role: NuisanceRole,
-    /// On which scale it is held.
     pub nuisance: Scale,
-    /// The squared residual, in variances, from which on no contact explains a reading.
+    /// Squared residual, in variances, at which a reading is `outside_model`.
     pub residual_limit: f64,
-    /// The contact's force in newtons, where it is known.
+    /// Known contact force, in newtons.
     pub force_n: Option<f64>,
 }
 
-/// Readings as a learnt function of position and nuisance coordinate, and its inversion.
+/// Locator by learnt readings as a function of position and nuisance coordinate.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct MeasuredLocator {
@@ -58,27 +53,28 @@ pub struct MeasuredLocator {
     search: Search,
 }
 
-/// A table that is ready to be searched.
+/// Table prepared for the search.
 #[derive(Clone, Debug, PartialEq)]
 struct Search {
-    /// Means, a layer a node of the nuisance coordinate.
+    /// Means, one layer per nuisance node.
     means: Layers,
-    /// v, the nodes of the nuisance coordinate in the place of channels.
+    /// v, with nuisance nodes in place of channels.
     variances: Layers,
     noise: WhiteNoise,
     cells: Cells,
     scan: Scan,
-    /// Greatest way of the reading from a place to the next along and across, over the deviations there, for each node of the nuisance coordinate.
+    /// Greatest distance of the reading from those of neighbours along and across, over the standard
+    /// deviations, per nuisance node.
     lengths: Vec<[f64; 2]>,
 }
 
-/// Nodes of a cell along either axis, where every place has a line of nodes; elsewhere 1.
+/// Nodes of a cell along either axis with a nuisance coordinate; otherwise 1.
 const STRIDE: usize = 3;
-/// Straight parts of a line from a node to the next.
+/// Straight segments between two nodes.
 const PARTS: usize = 4;
-/// Curves of a line that are tried, each around where the one before says that the nuisance coordinate is.
+/// Most windows on a line, each around the coordinate from the last.
 const MOST_WINDOWS: usize = 3;
-/// A gain beyond this many standard deviations is not looked for.
+/// Bound of the gain, in standard deviations.
 const MOST_GAIN: f64 = 6.0;
 
 impl Search {
@@ -103,7 +99,6 @@ impl Search {
         search
     }
 
-    /// The nodes of a place.
     fn line(&self, place: usize, nodes: usize) -> Line<'_> {
         Line {
             means: self.means.groups_of(place, 0..nodes),
@@ -111,7 +106,7 @@ impl Search {
         }
     }
 
-    /// From each node of a place to the lines of its neighbours.
+    /// Computes the distances from each node of a position to the lines of its neighbours.
     fn find_lengths(&mut self, axes: [Axis; 2], nodes: usize) {
         let noise = self.noise.without_gain();
         let mut stretches = Vec::new();
@@ -128,43 +123,43 @@ impl Search {
 }
 
 impl MeasuredLocator {
-    /// The learnt readings.
+    /// Returns the learnt readings.
     pub fn table(&self) -> &Table {
         &self.stored.table
     }
 
-    /// Whitening of scaled readings to channels of unit noise.
+    /// Returns the whitening of scaled readings to unit noise.
     pub fn whitening(&self) -> &Whitening {
         &self.stored.whitening
     }
 
-    /// Scale on which readings are compared.
+    /// Returns the scale of the readings.
     pub fn readings(&self) -> Scale {
         self.stored.readings
     }
 
-    /// Role of the nuisance coordinate.
+    /// Returns the role of the nuisance coordinate.
     pub fn role(&self) -> NuisanceRole {
         self.stored.role
     }
 
-    /// Scale on which the nuisance coordinate is held.
+    /// Returns the scale of the nuisance coordinate.
     pub fn nuisance(&self) -> Scale {
         self.stored.nuisance
     }
 
-    /// The same, which takes readings of a greater squared residual for none of a contact.
+    /// Sets the critical value of the squared residual.
     pub(super) fn with_residual_limit(mut self, limit: f64) -> Self {
         self.stored.residual_limit = limit;
         self
     }
 
-    /// The least squared residual of a reading, over the variances; NaN where the reading is off its scale.
+    /// Returns the least squared residual of a reading, over the variances; NaN for a reading off its scale.
     pub(super) fn misfit(&self, reading: &[f64]) -> f64 {
         self.seen(reading).map_or(f64::NAN, |seen| Inversion::new(seen).misfit())
     }
 
-    /// The contact of a reading, summed over the whole grid.
+    /// Returns the contact of a reading by summation over the whole grid.
     #[cfg(test)]
     pub(super) fn summed_everywhere(
         &self,
@@ -175,12 +170,12 @@ impl MeasuredLocator {
             .summed_everywhere(self.told_force(), per_node)
     }
 
-    /// True where its estimates have a force: one that is known, or the nuisance coordinate.
+    /// Returns whether estimates have a force: a known one, or the nuisance coordinate.
     pub fn tells_force(&self) -> bool {
         self.told_force() != ToldForce::Untold
     }
 
-    /// Source of the force of an estimate.
+    /// Source of an estimate's force.
     fn told_force(&self) -> ToldForce {
         match (self.stored.role, self.stored.force_n) {
             (NuisanceRole::Force, _) => ToldForce::Estimated,
@@ -189,7 +184,7 @@ impl MeasuredLocator {
         }
     }
 
-    /// The reading on its scale, whitened; `None` where it is off the scale.
+    /// Scales and whitens a reading; `None` off the scale.
     fn seen(&self, reading: &[f64]) -> Option<Seen<'_>> {
         let Stored { readings, whitening, .. } = &self.stored;
         let scaled = reading.iter().map(|value| readings.scaled(*value)).collect::<Option<Vec<f64>>>()?;
@@ -233,7 +228,7 @@ impl Stored {
         MeasuredLocator { search: Search::new(&self.table, &self.whitening), stored: self }
     }
 
-    /// Checks what a file may have got wrong.
+    /// Validates the content of a file.
     fn check(&self) -> Result<(), LocatorFault> {
         let Self { table, whitening, .. } = self;
         let numbers = |what, list: &[f64], good: fn(f64) -> bool, bound| {
@@ -270,7 +265,7 @@ impl From<MeasuredLocator> for Stored {
     }
 }
 
-/// A whitened reading, and room for what is interpolated to explain it.
+/// Whitened reading with buffers for interpolation.
 #[derive(Debug)]
 struct Seen<'a> {
     locator: &'a MeasuredLocator,
@@ -285,8 +280,8 @@ struct Seen<'a> {
 }
 
 impl Seen<'_> {
-    /// The least squared residual of a place and the integral over its line near a node; `None` where the line's ends or another part of it may
-    /// matter.
+    /// Least squared residual of a position and integral over its line near a node; `None` where the ends or
+    /// another part may matter.
     fn explain_near(&mut self, place: [f64; 2], mut near: f64) -> Option<(f64, Marginal)> {
         let nodes = self.nodes();
         for _ in 0..MOST_WINDOWS {
@@ -303,7 +298,7 @@ impl Seen<'_> {
         None
     }
 
-    /// The same of the whole line, in straight parts.
+    /// [`Self::explain_near`] over the whole line, in straight segments.
     fn explain_line(&mut self, place: [f64; 2]) -> (f64, Marginal) {
         let nodes = self.nodes();
         let Search { means, noise, .. } = &self.locator.search;
@@ -333,13 +328,13 @@ impl Seen<'_> {
         (misfit, Marginal { weight: weight * scale, mean: mean * scale, variance: variance * scale * scale })
     }
 
-    /// The variances of a line between those of the grid.
+    /// Interpolates the variances along the line of a position.
     fn interpolate_variances(&mut self, place: [f64; 2]) {
         self.locator.search.variances.interpolate(place, 0..1, &mut self.variances);
         self.variances.as_flattened_mut().iter_mut().for_each(|v| *v = v.max(0.0));
     }
 
-    /// The variance of the place that was interpolated last, at a node of its line.
+    /// Variance at a node of the line that was interpolated last.
     fn variance(&self, node: f64) -> f64 {
         let variances = self.variances.as_flattened();
         let (first, share) = self.stretch(node);
@@ -347,13 +342,13 @@ impl Seen<'_> {
         variances[first] + share * (variances[next] - variances[first])
     }
 
-    /// The stretch of a line that a node of the nuisance coordinate is in, and where in it.
+    /// Segment of a nuisance coordinate, and the fraction within it.
     fn stretch(&self, node: f64) -> (usize, f64) {
         let first = (node.max(0.0) as usize).min(self.nodes().saturating_sub(2));
         (first, node - first as f64)
     }
 
-    /// The equations where the latent number is the nuisance coordinate.
+    /// Equations with the nuisance coordinate as the latent variable.
     fn equations_of_line(&mut self, [x, y, latent]: Unknowns) -> Equations {
         let Search { means, .. } = &self.locator.search;
         let stencil = Stencil::new(latent, self.nodes());
@@ -366,7 +361,7 @@ impl Seen<'_> {
         })
     }
 
-    /// The equations where the latent number is a gain, in standard deviations.
+    /// Equations with a gain, in standard deviations, as the latent variable.
     fn equations_of_gain(&mut self, [x, y, latent]: Unknowns) -> Equations {
         let Search { means, noise, .. } = &self.locator.search;
         means.interpolate_slopes([x, y], 0..1, &mut self.slopes);
@@ -380,18 +375,17 @@ impl Seen<'_> {
         equations.with_prior(PriorTerms { cost: latent * latent, slope: latent, precision: 1.0 })
     }
 
-    /// Nodes of the nuisance coordinate.
     fn nodes(&self) -> usize {
         self.locator.stored.table.nuisance.count
     }
 }
 
-/// Sums the equations of a reading between nodes of the nuisance coordinate.
+/// Sums the equations of a reading between nuisance nodes.
 struct LineEquations<'a> {
     reading: &'a [Lanes],
     /// 1/V.
     weights: &'a [Lanes],
-    /// Means and slopes at the nodes of the stencil, one node after the other.
+    /// Means and slopes at the nodes of the stencil, node by node.
     slopes: &'a [Slopes],
     stencil: Stencil,
 }
@@ -454,7 +448,7 @@ impl Explain for Seen<'_> {
         [0, 1].map(|k| below[k].max(above[k]))
     }
 
-    /// Of the nuisance coordinate, in nodes, or of a gain, in standard deviations.
+    /// Range of the nuisance coordinate in nodes, or of a gain in standard deviations.
     fn range(&self) -> Option<(f64, f64)> {
         let nodes = self.nodes();
         let gain = self.locator.search.noise.gain > 0.0;
@@ -473,7 +467,7 @@ impl Explain for Seen<'_> {
         if self.nodes() > 1 { self.equations_of_line(at) } else { self.equations_of_gain(at) }
     }
 
-    /// Readings may be logarithms, which do not add up.
+    /// Zero, as readings may be logarithms, which do not add.
     fn spread(&mut self, _: Unknowns) -> f64 {
         0.0
     }
@@ -492,7 +486,7 @@ impl Explain for Seen<'_> {
         }
     }
 
-    /// The nuisance coordinate off its scale, where it is the force.
+    /// Force by the nuisance coordinate.
     fn force(&self, latent: f64, variance: f64) -> (f64, f64) {
         let Stored { table, nuisance, role, .. } = &self.locator.stored;
         if *role != NuisanceRole::Force {

@@ -1,20 +1,18 @@
-//! A surface without a model: what the sensors read is learnt as a function of where, and how, it is touched.
+//! Measured surface: readings learnt as a function of position and nuisance coordinate.
 //!
-//! The forward way: reading = f(position, nuisance) + noise, with f a Gaussian process, and *nuisance* whatever else shapes
-//! the reading, is known while calibrating and unknown afterwards: the force, or how deep the surface is indented. A
-//! reading is located by its posterior over position and nuisance coordinate, every value of both within the presses
-//! that were made (and half a gap beyond) held as likely as any other before the reading is seen, and positions up to a whole gap
-//! beyond as less likely:
+//! The forward model is reading = f(position, nuisance) + noise, with f a Gaussian process. The nuisance
+//! coordinate is recorded in the calibration and unknown in use, such as force or indentation depth. The
+//! prior is uniform over the calibrated range and half a gap beyond; positions up to a whole gap beyond have
+//! less weight. The posterior is
 //!
 //! p(position | reading) ∝ ∫ N(reading; f̄, C + v·S) d nuisance,
 //!
-//! f̄ and v the process's mean and relative variance, S its signal's covariance, C that of the noise, and N the normal
-//! density without its determinant: v is least at the presses, so its determinant would pull every estimate towards
-//! them, as if contacts between presses were less probable. The position is the posterior's mean, which has the
-//! least mean square error.
+//! with f̄ and v the process's mean and relative variance, S the signal covariance, C the noise covariance,
+//! and N the normal density without its determinant. v is least at the presses: the determinant would draw
+//! every estimate towards them. The estimate is the posterior mean.
 //!
-//! C is that of repeats, or what the process calls noise where there are none, widened by what positions that were held
-//! out of the recording show it to miss.
+//! C follows from repeats, or from the process without repeats, scaled by the overdispersion at held-out
+//! positions.
 
 mod config;
 mod curve;

@@ -1,4 +1,4 @@
-//! The recording as the regression sees it: repeats of a press averaged, readings and nuisance coordinate on their scales.
+//! Presses of the regression: repeats averaged, readings and nuisance coordinate on their scales.
 
 use super::config::{MeasuredError, MeasuredInfluence, Scale};
 use super::locator::NuisanceRole;
@@ -8,12 +8,13 @@ use ndarray::Array2;
 use palpate_numerics::mean;
 use std::collections::HashMap;
 
-/// Coordinates that shape the readings besides the position, row by row: the named columns, or a force that is not always the same.
+/// Returns the nuisance coordinates row by row: the named columns, or a recorded force that the setup does
+/// not fix.
 pub(super) fn nuisance_coordinates(
     setup: &Setup,
     recording: &Recording,
 ) -> Result<(NuisanceRole, Vec<Vec<f64>>), MeasuredError> {
-    // As many in every row as in the row that has most.
+    // Every row needs as many as the longest one.
     let all = |what, values: Vec<Vec<f64>>| {
         let most = values.iter().map(Vec::len).max().unwrap_or_default();
         match values.iter().position(|values| values.len() < most) {
@@ -26,7 +27,7 @@ pub(super) fn nuisance_coordinates(
         let named = all("nuisance coordinate", rows.iter().map(|row| row.nuisances.clone()).collect())?;
         return Ok((NuisanceRole::Other, named));
     }
-    // A force that is known, or always the same, shapes nothing.
+    // A known or unrecorded force is not a coordinate.
     if setup.force_n().is_some() || rows.iter().all(|row| row.force_n.is_none()) {
         return Ok((NuisanceRole::None, vec![Vec::new(); rows.len()]));
     }
@@ -34,19 +35,19 @@ pub(super) fn nuisance_coordinates(
     Ok((NuisanceRole::Force, force))
 }
 
-/// A nuisance coordinate beyond the first, whose value is not looked for in use: what the recording has of it.
+/// Nuisance coordinate beyond the first, not estimated in use.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Further {
-    /// Which of a row's nuisance coordinates it is.
+    /// Index among a row's nuisance coordinates.
     index: usize,
-    /// Mean of its recorded values.
+    /// Mean of the recorded values.
     pub mean: f64,
-    /// Variance of its recorded values, greater than 0.
+    /// Variance of the recorded values, greater than 0.
     pub variance: f64,
 }
 
 impl Further {
-    /// All of the rows' nuisance coordinates beyond the first that vary; what is always the same shapes nothing.
+    /// Returns the nuisance coordinates beyond the first that vary.
     fn of_rows(nuisances: &[Vec<f64>]) -> Vec<Self> {
         let count = nuisances.first().map_or(0, Vec::len);
         let of = |index: usize| {
@@ -60,18 +61,18 @@ impl Further {
     }
 }
 
-/// The recording as the process sees it: repeats of a press, at the same position and nuisance coordinates, are one.
+/// Presses of the regression: averages of rows at equal position and nuisance coordinates.
 ///
-/// Texture of the surface that repeats itself at a place but is not smooth, as a press a little off, is noise to
-/// interpolation, and its process finds it; how repeats scatter about their mean is the noise of a reading.
+/// Rough texture or misplacement that repeats at a position is noise to interpolation, which the process
+/// estimates. The scatter of repeats about their mean is the noise of a reading.
 pub(super) struct Presses {
     pub readings: Scale,
     pub nuisance: Scale,
-    /// Position along, across where the surface has a width, the nuisance coordinate where there is one, and the further ones: n×d.
+    /// Position, nuisance coordinate if any, and further ones: n × d.
     pub coordinates: Array2<f64>,
-    /// Mean scaled readings, n×m.
+    /// Mean scaled readings, n × m.
     pub means: Array2<f64>,
-    /// To which press each row belongs.
+    /// Press of each row.
     pub places: Vec<usize>,
     /// Scaled readings, row by row.
     pub outputs: Array2<f64>,
@@ -140,12 +141,12 @@ impl Presses {
         })
     }
 
-    /// Coordinates of a table: those of the position, and the first nuisance coordinate.
+    /// Number of table coordinates: position and first nuisance coordinate.
     pub fn searched(&self) -> usize {
         self.coordinates.ncols() - self.further.len()
     }
 
-    /// Coordinates of the position.
+    /// Number of position coordinates.
     pub fn dimensions(&self) -> usize {
         self.searched() - usize::from(self.has_nuisance)
     }

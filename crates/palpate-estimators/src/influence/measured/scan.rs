@@ -1,9 +1,9 @@
-//! Misfit of the middles of a table's cells to a reading, eight cells side by side.
+//! Coarse search over the middles of a table's cells, eight cells side by side.
 //!
-//! With weights w that are the same all along a place's line (those of the largest variance there), |z − μ|² = Σ w·z² − 2·Σ w·μ·z + Σ w·μ²
-//! takes one product a channel and node. Of two nodes with the squares r₀ and r₁ and the squared distance d², the stretch between them comes
-//! closest at s = (r₀ + d² − r₁)/(2·d²); 1/d² is in the table, as dividing would take a third of the time. What is left is that of reading the
-//! table of products once from memory.
+//! With equal weights w along a position's line (by its largest variance), |z − μ|² = Σ w·z² − 2·Σ w·μ·z + Σ
+//! w·μ² takes one product per channel and node. For two nodes with squares r₀ and r₁ and squared distance d²,
+//! the segment between them is closest at s = (r₀ + d² − r₁)/(2·d²). The table has 1/d², as division is slow.
+//! Reading the products from memory dominates the time.
 
 use super::table::Table;
 use crate::influence::inversion::{CellBlocks, Cells};
@@ -21,17 +21,17 @@ pub(super) struct Scan {
     weights: Vec<Lanes>,
     /// w·μ, node by node and channel by channel.
     products: Vec<Lanes>,
-    /// Σ w·μ² of each node, and Σ w·d² of the way from each node to the next.
+    /// Σ w·μ² of each node; below, Σ w·d² to the next node.
     squares: Vec<Lanes>,
     ways: Vec<Lanes>,
-    /// 1/Σ w·d², finite where nothing changes from a node to the next.
+    /// 1/Σ w·d², finite for equal nodes.
     per_way: Vec<Lanes>,
     /// γ².
     gain2: f64,
 }
 
 impl Scan {
-    /// Of the middles of `cells`.
+    /// Tabulates the middles of `cells`.
     pub fn new(table: &Table, whitening: &Whitening, cells: Cells) -> Self {
         let (channels, nodes) = (table.channels(), table.nuisance.count);
         let blocks = cells.len().div_ceil(LANES);
@@ -76,7 +76,7 @@ impl CellBlocks for Scan {
         self.cells
     }
 
-    /// The least squared residual of each cell of a block, and the node of the nuisance coordinate where it is.
+    /// Least squared residual of each cell of a block, and the nuisance coordinate there.
     #[inline(always)]
     fn look<V: Eight>(&self, block: usize, reading: &[f64]) -> [V; 3] {
         let (zero, one, two) = (V::splat(0.0), V::splat(1.0), V::splat(2.0));

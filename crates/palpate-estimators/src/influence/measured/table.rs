@@ -10,34 +10,34 @@ use crate::influence::grid::Axis;
 pub struct Table {
     /// Along the surface, in metres.
     pub x: Axis,
-    /// Across it, in metres; a single node on a one-dimensional surface.
+    /// Across it, in metres; a single node on a line.
     pub y: Axis,
-    /// The nuisance coordinate on its scale; a single node where there is none.
+    /// Scaled nuisance coordinate; a single node without one.
     pub nuisance: Axis,
     /// W·f̄, channel by channel, node by node.
     pub means: Vec<f64>,
-    /// v: the process's variance over its signal's, 0 to 1, node by node.
+    /// v: process variance over the signal's, 0 to 1, node by node.
     pub variances: Vec<f64>,
 }
 
 impl Table {
-    /// The same for noise of `factor` times the deviation.
+    /// Scales the noise standard deviation by `factor`.
     pub(super) fn widened(mut self, factor: f64) -> Self {
         self.means.iter_mut().for_each(|value| *value /= factor);
         self
     }
 
-    /// Places (x, y).
+    /// Returns the number of positions (x, y).
     pub fn places(&self) -> usize {
         self.x.count * self.y.count
     }
 
-    /// Channels of a reading.
+    /// Number of channels of a reading.
     pub(super) fn channels(&self) -> usize {
         self.means.len() / self.variances.len().max(1)
     }
 
-    /// The mean of a channel at a node of a place.
+    /// Mean of a channel at a nuisance node of a position.
     pub(super) fn mean(&self, place: usize, node: usize, channel: usize) -> f64 {
         self.means[(place * self.nuisance.count + node) * self.channels() + channel]
     }
