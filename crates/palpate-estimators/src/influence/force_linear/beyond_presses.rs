@@ -1,13 +1,10 @@
 //! Intervals of contacts beyond the outermost calibrated positions.
 //!
-//! The influence functions are extrapolated there, and unknown sensors may lie there. An interval of the
-//! position that reaches beyond the outermost position extends to the edge of the surface. With an unknown
-//! force (force–position trade-off), the interval of the force then contains all forces. On a plane the 99 %
-//! interval decides.
-//!
-//! On a line the intervals are by the likelihood ratio ([`crate::trade_off`]), which admits one outlying
-//! channel; the prior of the posterior would exclude contacts near the end. With a known force, either end of
-//! the grid may explain a contact beyond it best: an interval that reaches such an end is the whole surface.
+//! An interval that reaches there extends to the edge of the surface; for an unknown force (force–position
+//! trade-off) the interval of the force then contains all forces. On a plane the 99 % interval decides. On a
+//! line intervals are by the likelihood ratio ([`crate::trade_off`]), as the posterior excludes contacts near
+//! the end by its prior. For a known force either end of the grid may explain a contact beyond it: an
+//! interval that reaches such an end is the whole surface.
 
 use super::locator::{ForceLinearLocator, Stored};
 use crate::influence::grid::Axis;
@@ -28,8 +25,6 @@ impl ForceLinearLocator {
         }
     }
 
-    /// Extends intervals on a plane to the edges where their 99 % interval reaches beyond the outermost
-    /// positions.
     fn open_edges(&self, estimate: &mut Estimate) {
         let ContactEstimate { position, uncertainty: Some(uncertainty), .. } = &mut estimate.contact else {
             return;
@@ -56,7 +51,6 @@ impl ForceLinearLocator {
         }
     }
 
-    /// Extends intervals on a line where a mode is near an end.
     fn tell_near_ends(&self, axis: Axis, relative: &[f64], estimate: &mut Estimate) {
         let modes = estimate.modes.as_slice().iter().map(|mode| mode.contact);
         let contacts: Vec<ContactEstimate> = std::iter::once(estimate.contact).chain(modes).collect();
@@ -78,7 +72,6 @@ impl ForceLinearLocator {
         }
     }
 
-    /// Returns the confidence region over the grid: positions from the first node, and φ for the force.
     fn not_excluded(&self, axis: Axis, relative: &[f64], minima_m: &[f64]) -> Option<NotExcluded> {
         let seen = RefCell::new(self.seen(relative));
         let channels = |along_m: f64, response_n: f64, channels: &mut Vec<[f64; 2]>| {
@@ -96,7 +89,7 @@ impl ForceLinearLocator {
         contacts.not_excluded(minima_m)
     }
 
-    /// Coordinate k of the outermost calibrated positions; the grid's ends in files without them.
+    /// Coordinate k of the outermost positions; the grid's ends in files without them.
     fn outermost_m(&self, k: usize) -> (f64, f64) {
         let axis = self.axes()[k];
         let of_grid = || (axis.start, axis.start + length_m(axis));
@@ -107,7 +100,6 @@ impl ForceLinearLocator {
         self.stored.prior.force_of_response(self.force_prior.ends_n().1, 0.0).0
     }
 
-    /// Intervals of position and force on the surface; no interval of a known force.
     fn on_surface(&self, axis: Axis, found: &NotExcluded) -> ((f64, f64), Option<(f64, f64)>) {
         let Stored { prior, .. } = &self.stored;
         let (_, hardest_n) = self.force_prior.ends_n();
@@ -136,7 +128,6 @@ impl ForceLinearLocator {
     }
 }
 
-/// Scales a 95 % interval about the estimate to 99 %.
 fn of_99(at_m: f64, (low_m, high_m): (f64, f64)) -> (f64, f64) {
     const TIMES: f64 = NORMAL_99 / NORMAL_95;
     (at_m - TIMES * (at_m - low_m), at_m + TIMES * (high_m - at_m))
@@ -146,7 +137,6 @@ fn length_m(axis: Axis) -> f64 {
     axis.step * (axis.count - 1) as f64
 }
 
-/// Returns whether a contact may lie beyond the outermost positions.
 fn is_near((first_m, last_m): (f64, f64), contact: &ContactEstimate) -> bool {
     /// Standard deviations.
     const NEAR: f64 = 5.0;

@@ -1,30 +1,25 @@
 //! Coarse search with a log-normal prior of the force.
 //!
-//! Forces then span decades, and variances grow with φ: bounds by the variances of the largest φ are loose
-//! for small φ. The least-squares φ of a node depends little on the variances. It is computed with those of φ
-//! = 0, where noise weights the channels, and of the largest φ, where the calibration does. The larger result
-//! gives the variances of the node.
-//!
-//! The prior's width is that of ln φ: a signal-to-noise ratio z adds the cost ln(1 + s²·z²).
+//! Forces span decades, and variances grow with φ. The least-squares φ of a node is computed with the
+//! variances of φ = 0 and of the largest φ; the larger result gives the node's variances. The prior of ln φ
+//! adds the cost ln(1 + s²·z²) at the signal-to-noise ratio z.
 
 use crate::force_prior::LogNormalPrior;
 use crate::influence::inversion::CellBlocks;
 use crate::influence::lanes::{LANES, Lanes};
 use palpate_numerics::simd::Eight;
 
-/// Influences and variances of all nodes, in blocks of eight.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct BroadScan {
     prior: LogNormalPrior,
     places: usize,
     channels: usize,
-    /// Channel by channel.
     terms: Vec<Terms>,
-    /// Lower bound of the log determinant: Σ ln of the least variances.
+    /// Lower bound of the log determinant.
     constants: Vec<Lanes>,
 }
 
-/// Channel at a node: influence f, and variance noise + ω + φ·(2·β + φ·v) of the reading.
+/// Influence f and variance noise + ω + φ·(2·β + φ·v) of a channel at a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ChannelAtPlace {
     pub f: f64,
@@ -33,12 +28,10 @@ pub(super) struct ChannelAtPlace {
     pub open: f64,
     pub beta: f64,
     pub v: f64,
-    /// Least variance over φ.
     pub least: f64,
 }
 
 impl ChannelAtPlace {
-    /// Scales the variances of noise and of calibration.
     pub fn scaled(self, noise: f64, calibration: f64) -> Self {
         Self {
             noise: noise * self.noise,
@@ -67,7 +60,7 @@ struct Sums<V> {
 }
 
 impl<V: Eight> Sums<V> {
-    /// Least-squares φ, from 0 to `greatest`.
+    /// Least-squares φ.
     ///
     /// Not a closure: closures are not compiled for the instructions of the caller.
     #[inline(always)]
@@ -106,7 +99,6 @@ impl BroadScan {
         Self { prior, places, channels, terms, constants }
     }
 
-    /// Sums of a block's nodes, with the variances of `response`.
     #[inline(always)] // Compiled for the instructions of its caller.
     fn sums<V: Eight>(&self, block: usize, reading: &[f64], response: V) -> Sums<V> {
         let zero = V::splat(0.0);
@@ -130,7 +122,6 @@ impl CellBlocks for BroadScan {
         self.places
     }
 
-    /// Approximate least chi-squared, cost and φ of each node of a block.
     #[inline(always)]
     fn look<V: Eight>(&self, block: usize, reading: &[f64]) -> [V; 3] {
         let (_, greatest_n) = self.prior.ends_n();

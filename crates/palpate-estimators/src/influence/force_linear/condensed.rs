@@ -1,17 +1,14 @@
-//! Condensed presses: few presses with nearly the likelihood of many.
+//! Condensed presses: few presses with the likelihood of many.
 //!
-//! Presses at one position, with responses φ_i and weights w_i (rows over variance), enter offset and
-//! influence through the sums of w, w·φ, w·φ², w·y and w·φ·y alone. Two presses at φ̄ ± sd(φ), each of half
-//! the weight and on the least-squares line of y over φ, have equal sums.
+//! Presses at one position, with responses φ_i and weights w_i (rows over variance), enter by the sums of w,
+//! w·φ, w·φ², w·y and w·φ·y alone. Two presses at φ̄ ± sd(φ) on the least-squares line have equal sums.
 //!
-//! With too many positions for that, neighbours share a cell. An estimate ô, f̂ from fewer cells, two presses
-//! each, corrects readings for the change of position within a cell. One press remains at x̄, the mean of the
-//! positions by w·φ², and the root mean square φ_r, with the reading
+//! With many positions, neighbours share a cell, and an estimate ô, f̂ corrects for the change within it. One
+//! press remains at x̄, the mean position by w·φ², and the root mean square φ_r:
 //!
 //! y = ô + φ_r·(f̂(x̄) + Σ w·φ·(y − ô − φ·f̂(x)) / Σ w·φ²).
 //!
-//! A press without force that reads ô, of weight Σ w·(1 − φ̄²/φ_r²), carries the remaining information on the
-//! offset.
+//! A press without force, of weight Σ w·(1 − φ̄²/φ_r²), reads ô.
 
 use super::drift::END;
 use super::evidence::{ChannelFit, Evidence};
@@ -25,8 +22,7 @@ use palpate_numerics::watch::{Cancelled, Watch};
 use std::sync::Arc;
 
 impl Presses {
-    /// Returns about `most` presses equivalent to all under a separable prior without drift; `fits` are the
-    /// channels' noise and signal.
+    /// Condenses to about `most` presses, for a separable prior without drift.
     pub fn condensed(
         &self,
         prior: &Prior,
@@ -34,7 +30,6 @@ impl Presses {
         most: usize,
         watch: Watch,
     ) -> Result<Self, MeasuredError> {
-        /// Rounds of estimate and condensation.
         const ROUNDS: usize = 2;
         let all = All { presses: self, responses: prior.responses(self), prior };
         let (untouched, touched): (Vec<usize>, Vec<usize>) =
@@ -63,8 +58,7 @@ impl Presses {
         Ok(few)
     }
 
-    /// Returns at most about `most` presses equivalent for the offset over time. Neighbours in time share a
-    /// cell, corrected to a common position by `estimate`.
+    /// Condenses neighbours in time to about `most` presses, corrected to a common position by `estimate`.
     pub fn condensed_in_time(
         &self,
         prior: &Prior,
@@ -92,7 +86,7 @@ impl Presses {
         self.means.push_row(reading.view()).expect("as many channels as all presses have");
     }
 
-    /// Adds two presses on a cell's least-squares line, or one where all forces are equal.
+    /// Adds two presses on a cell's least-squares line, or one for a single force.
     fn add_pair(&mut self, all: &All, cell: &[usize], estimate: Option<&Estimate>) {
         let sums = Sums::new(all, cell);
         let spread = sums.spread();
@@ -135,7 +129,7 @@ impl Presses {
         }
     }
 
-    /// Adds the one press of a cell; returns the weight of the cell's information on the offset.
+    /// Adds the press of a cell; returns the weight of the press without force.
     fn add_cell(&mut self, all: &All, cell: &[usize], estimate: &Estimate) -> f64 {
         let sums = Sums::new(all, cell);
         let response = sums.mean_square.sqrt();
@@ -166,7 +160,6 @@ impl Presses {
     }
 }
 
-/// All presses with their φ/F̄.
 struct All<'a> {
     presses: &'a Presses,
     responses: Vec<f64>,
@@ -174,7 +167,7 @@ struct All<'a> {
 }
 
 impl All<'_> {
-    /// Weighted mean over a cell of `value(k, i)`: k is the index in the cell, i that in all presses.
+    /// Weighted mean of `value(k, i)`, with k the index in the cell.
     fn mean(&self, cell: &[usize], value: impl Fn(usize, usize) -> f64) -> f64 {
         let (sum, weight) = cell.iter().enumerate().fold((0.0, 0.0), |(sum, weight), (k, i)| {
             let own = self.weight(*i);
@@ -183,7 +176,6 @@ impl All<'_> {
         sum / weight
     }
 
-    /// Readings of a cell, corrected to its mean position by `estimate`.
     fn readings(&self, cell: &[usize], sums: &Sums, estimate: Option<&Estimate>) -> Array2<f64> {
         let mut readings = self.presses.means.select(Dimension(0), cell);
         if let Some(estimate) = estimate
@@ -198,12 +190,11 @@ impl All<'_> {
         readings
     }
 
-    /// Number of rows over the noise variance relative to an untouched row.
+    /// Number of rows over the relative noise variance.
     fn weight(&self, i: usize) -> f64 {
         self.presses.count[i] / self.prior.relative_noise_of(self.presses, i)
     }
 
-    /// Number of rows of a press with this weight.
     fn count_of(&self, weight: f64, force_n: f64, place_m: &[f64]) -> f64 {
         weight * self.prior.relative_noise(force_n, place_m)
     }
@@ -213,12 +204,11 @@ impl All<'_> {
     }
 }
 
-/// Weight and weighted means of a cell.
 struct Sums {
     position_m: Vec<f64>,
     weight: f64,
     time: f64,
-    /// Mean of φ/F̄, and of its square.
+    /// Means of φ/F̄ and its square.
     response: f64,
     mean_square: f64,
 }
@@ -247,7 +237,7 @@ impl Sums {
         }
     }
 
-    /// Standard deviation of φ/F̄; 0 where values agree within rounding.
+    /// Standard deviation of φ/F̄.
     fn spread(&self) -> f64 {
         const ROUNDING: f64 = 1e-12;
         let variance = self.mean_square - self.response * self.response;
@@ -255,7 +245,6 @@ impl Sums {
     }
 }
 
-/// Posterior means of offsets and influences of unit response.
 pub(super) struct Estimate {
     presses: Presses,
     responses: Vec<f64>,
@@ -290,13 +279,13 @@ impl Estimate {
         })
     }
 
-    /// f̂ of every channel at a position.
+    /// f̂ at a position.
     fn influences(&self, prior: &Prior, place_m: &[f64]) -> Array1<f64> {
         let covariance = prior.influence_covariance(&self.presses, &self.responses, place_m);
         covariance.dot(&self.weights) + Array1::from(prior.polynomials_at(place_m)).dot(&self.polynomials)
     }
 
-    /// f̂ of every channel at each press of a cell.
+    /// f̂ at each press of a cell.
     fn influences_at(&self, all: &All, cell: &[usize]) -> Array2<f64> {
         let mut influences = Array2::zeros((cell.len(), self.offsets.len()));
         for (k, i) in cell.iter().enumerate() {

@@ -1,16 +1,14 @@
-//! Drift of the channels' offsets during a recording.
+//! Drift of the offsets during a recording.
 
 use palpate_numerics::regression::Kernel;
 use serde::{Deserialize, Serialize};
 
-/// Time of the recording's last row, where the offset is estimated: located readings come after it.
+/// Time of the last row, which located readings follow.
 pub(super) const END: f64 = 1.0;
-/// Time of the recording's first row.
 pub(super) const START: f64 = 0.0;
 
-/// Course of the drift: a Gaussian process of time, from 0 at the first row to 1 at the last row.
-///
-/// The change from the first row to the last has variance 1.
+/// Course of the drift: a Gaussian process of time, from 0 at the first row to 1 at the last, with a total
+/// change of variance 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DriftCourse {
@@ -19,16 +17,15 @@ pub enum DriftCourse {
     Walk,
     /// Proportional to time.
     Linear,
-    /// Smooth, with a squared-exponential correlation over half the recording.
+    /// Smooth: squared-exponential correlation over half the recording.
     Smooth,
 }
 
 impl DriftCourse {
     pub(super) const ALL: [Self; 3] = [Self::Walk, Self::Linear, Self::Smooth];
 
-    /// Returns the covariance of the drift from times `a` and `b` to the last row.
+    /// Covariance of the drift from `a` and `b` to the last row.
     pub(super) fn covariance(self, a: f64, b: f64) -> f64 {
-        /// Length scale of the smooth course.
         const LENGTH: f64 = 0.5;
         let correlation = |way: f64| Kernel::SquaredExponential.correlation((way / LENGTH) * (way / LENGTH));
         match self {

@@ -1,14 +1,11 @@
-//! Restricted log evidence of a channel's presses under a prior.
+//! Restricted log evidence of a channel's presses under a prior (Patterson and Thompson, Biometrika 58, 1971;
+//! Rasmussen and Williams, *Gaussian Processes for Machine Learning*, 2006, section 2.7).
 //!
-//! Offset and polynomials have flat priors and are projected out (Patterson and Thompson, Biometrika 58,
-//! 1971; Rasmussen and Williams, *Gaussian Processes for Machine Learning*, 2006, section 2.7).
-//!
-//! Let A = L·Lᵀ be the covariance of the presses over s², H the design matrix of offset and polynomials, and
-//! M the projection of L⁻¹·y orthogonal to L⁻¹·H. The log evidence is −½·(ν·ln s² + ln|A| + ln|Hᵀ·A⁻¹·H|),
-//! with s² = |M·L⁻¹·y|²/ν at the maximum and ν the number of presses minus the columns of H. A source at p
-//! with amplitude variance τ·s² adds the column u(p), a rank-1 update: |M·L⁻¹·y|² falls by τ·(vᵀ·w)²/(1 +
-//! τ·vᵀ·v), with v = M·L⁻¹·u and w = M·L⁻¹·y, and the determinants grow by ln(1 + τ·vᵀ·v). The evidence is
-//! averaged over positions and powers of ten of τ.
+//! Let A = L·Lᵀ be the covariance over s², H the design matrix of offset and polynomials (flat priors), and M
+//! the projection orthogonal to L⁻¹·H. The log evidence is −½·(ν·ln s² + ln|A| + ln|Hᵀ·A⁻¹·H|), with s² =
+//! |M·L⁻¹·y|²/ν and ν the presses minus the columns of H. A source at p of amplitude variance τ·s² adds the
+//! column u(p): |M·L⁻¹·y|² falls by τ·(vᵀ·w)²/(1 + τ·vᵀ·v), with v = M·L⁻¹·u and w = M·L⁻¹·y, and the
+//! determinants grow by ln(1 + τ·vᵀ·v). Positions and powers of ten of τ are averaged.
 
 use super::presses::{Presses, Repeated};
 use super::prior::Prior;
@@ -18,14 +15,12 @@ use palpate_numerics::{Cholesky, NotPositiveDefinite, mean_and_variance};
 
 /// Powers of ten of ρ.
 type Decades = std::ops::RangeInclusive<i32>;
-/// Search range without a previous fit.
 pub(super) const ALL_DECADES: Decades = -10..=1;
-/// Powers of ten of τ, with equal prior probability.
+/// Powers of ten of τ.
 const AMPLITUDES: std::ops::RangeInclusive<i32> = 0..=6;
-/// Least weight of a source relative to the largest.
 const LEAST_SHARE: f64 = 1e-3;
 
-/// Factored covariance, with offset and polynomials projected out.
+/// Covariance with offset and polynomials projected out.
 pub(super) struct Restricted {
     pub cholesky: Cholesky,
     /// L⁻¹·H, n × q.
@@ -47,17 +42,16 @@ impl Restricted {
         Ok(Self { cholesky, effects, gram, log_determinant })
     }
 
-    /// Number of columns of H.
     pub fn effects(&self) -> usize {
         self.effects.ncols()
     }
 
-    /// Coefficients of H for each column of L⁻¹·y.
+    /// Coefficients of H for columns of L⁻¹·y.
     pub fn coefficients(&self, white: &Array2<f64>) -> Array2<f64> {
         self.gram.solve_matrix(self.effects.t().dot(white))
     }
 
-    /// M·L⁻¹·y of each column of y, and the coefficients of H.
+    /// M·L⁻¹·y and the coefficients of H, by columns of y.
     pub fn residuals(&self, columns: Array2<f64>) -> (Array2<f64>, Array2<f64>) {
         self.residuals_of_white(self.cholesky.solve_lower_matrix(columns))
     }
@@ -67,39 +61,35 @@ impl Restricted {
         self.residuals_of_white(self.cholesky.inverse_lower()).0
     }
 
-    /// M·x of each column x = L⁻¹·y, and the coefficients of H.
     fn residuals_of_white(&self, mut white: Array2<f64>) -> (Array2<f64>, Array2<f64>) {
         let coefficients = self.coefficients(&white);
         general_mat_mul(-1.0, &self.effects, &coefficients, 1.0, &mut white);
         (white, coefficients)
     }
 
-    /// R⁻ᵀ·(h − Hᵀ·A⁻¹·k), with `white` = L⁻¹·k: inner products of columns are covariances.
+    /// R⁻ᵀ·(h − Hᵀ·A⁻¹·k), with `white` = L⁻¹·k.
     pub fn open_effects(&self, h: &Array2<f64>, white: &Array2<f64>) -> Array2<f64> {
         self.gram.solve_lower_matrix(h - &self.effects.t().dot(white))
     }
 }
 
-/// Point source of a channel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SourceFit {
-    /// Index of the position.
     pub place: usize,
-    /// Posterior probability; all weights sum to 1.
+    /// Posterior probability.
     pub weight: f64,
-    /// Mean of the amplitude, and its variance over s².
+    /// Posterior mean, and variance over s².
     pub amplitude: f64,
     pub variance: f64,
 }
 
-/// Noise, signal and sources of one channel under a prior.
 #[derive(Clone, Debug)]
 pub(super) struct ChannelFit {
     /// ρ: noise variance over s².
     pub ratio: f64,
     /// s².
     pub signal: f64,
-    /// Log density of the presses and noise, up to a constant.
+    /// Log density, up to a constant.
     pub evidence: f64,
     pub sources: Vec<SourceFit>,
 }
@@ -109,13 +99,11 @@ impl ChannelFit {
         self.signal * self.ratio
     }
 
-    /// Returns the source of largest weight; `None` without sources.
     pub fn most_probable_source(&self) -> Option<&SourceFit> {
         self.sources.iter().max_by(|a, b| a.weight.total_cmp(&b.weight))
     }
 }
 
-/// Log evidence of presses under one prior, with candidate positions of sources.
 pub(super) struct Evidence<'a> {
     pub presses: &'a Presses,
     pub prior: &'a Prior,
@@ -124,19 +112,14 @@ pub(super) struct Evidence<'a> {
     /// Noise and drift, over ρ.
     noise: Noise,
     effects: Array2<f64>,
-    /// Readings by a unit source at each position.
     sources: Array2<f64>,
     repeats: RepeatedNoise,
     noise_priors: Vec<NoisePrior>,
 }
 
-/// Prior of a channel's noise for few presses.
-///
-/// With as many coefficients as presses the likelihood favours zero noise. The prior centres the noise at 1 %
-/// of the signal, within a factor of three and with heavy tails (Student's t, one degree of freedom). It
-/// excludes noise below rounding.
+/// Prior of the noise for few presses, which coefficients may fit exactly: 1 % of the signal within a factor
+/// of three, heavy-tailed (Student's t, one degree of freedom), above rounding.
 struct NoisePrior {
-    /// Variance of the readings.
     changes: f64,
     rounding: f64,
     /// [`Presses::fewness`].
@@ -152,7 +135,7 @@ impl NoisePrior {
         (0..presses.centre.len()).map(channel).collect()
     }
 
-    /// Log density of ln σ², up to a constant.
+    /// Log density of ln σ².
     fn log_density(&self, variance: f64) -> f64 {
         /// Centre over `changes`, and scale in powers of ten.
         const SHARE: f64 = 1e-4;
@@ -165,11 +148,9 @@ impl NoisePrior {
     }
 }
 
-/// Covariance of noise and drift, over the noise variance of an untouched row.
+/// Noise and drift, over the noise variance of an untouched row.
 struct Noise {
-    /// Variances of the independent noise.
     diagonal: Vec<f64>,
-    /// n × n; `None` without drift.
     drift: Option<Array2<f64>>,
 }
 
@@ -195,10 +176,9 @@ impl Noise {
     }
 }
 
-/// Sums of squares of repeats, for the noise of untouched rows.
+/// Squares of repeats, for the noise of untouched rows.
 struct RepeatedNoise {
     freedom: f64,
-    /// Squared deviations per channel, over the relative noise variance.
     squares: Array1<f64>,
     /// Σ ν·ln of the relative variances.
     log_determinant: f64,
@@ -238,24 +218,21 @@ impl<'a> Evidence<'a> {
         }
     }
 
-    /// Degrees of freedom of a channel.
     fn freedom(&self) -> f64 {
         self.presses.len() as f64 + self.repeats.freedom - self.effects.ncols() as f64
     }
 
-    /// Factors the covariance at one ρ.
     pub fn restricted(&self, ratio: f64) -> Result<Restricted, NotPositiveDefinite> {
         Restricted::new(self.noise.added_to(&self.covariance, ratio), &self.effects)
     }
 
-    /// Returns the fit of every channel at its best power of ten of ρ; `None` where offset and polynomials
-    /// are unidentifiable.
+    /// Fits at the best power of ten of ρ; `None` where offset and polynomials are unidentifiable.
     pub fn best_decades(&self, decades: Decades) -> Option<Vec<ChannelFit>> {
         let ratios = decades.map(|decade| 10f64.powi(decade));
         self.best_of(ratios)
     }
 
-    /// Refines ρ to a quarter of a power of ten around `fits`.
+    /// Refines ρ to a quarter of a power of ten.
     pub fn refined(&self, fits: Vec<ChannelFit>) -> Vec<ChannelFit> {
         const STEPS: std::ops::RangeInclusive<i32> = -3..=3;
         let mut ratios: Vec<f64> = Vec::new();
@@ -287,7 +264,6 @@ impl<'a> Evidence<'a> {
         best
     }
 
-    /// Fits of all channels at one ρ.
     fn with_ratio(&self, ratio: f64) -> Option<Vec<ChannelFit>> {
         let restricted = self.restricted(ratio).ok()?;
         let (white, _) = restricted.residuals(self.presses.means.clone());
@@ -304,7 +280,7 @@ impl<'a> Evidence<'a> {
         fits.iter().all(|fit| fit.evidence.is_finite()).then_some(fits)
     }
 
-    /// Returns the fit of channel `c` at one ρ; `white` is M·L⁻¹·y.
+    /// Fit of channel `c`; `white` is M·L⁻¹·y.
     pub fn channel(
         &self,
         restricted: &Restricted,
@@ -337,19 +313,17 @@ impl<'a> Evidence<'a> {
     }
 }
 
-/// Candidate sources projected by M·L⁻¹ at one ρ.
 #[derive(Clone)]
 pub(super) struct WhiteSources {
-    /// v = M·L⁻¹·u, one column per position.
+    /// v, one column per position.
     pub columns: Array2<f64>,
     amplitudes: Vec<Amplitude>,
 }
 
-/// Source at one position, with amplitude variance τ·s².
 #[derive(Clone, Copy)]
 struct Amplitude {
     place: usize,
-    /// Posterior variance of the amplitude over s²: τ/(1 + τ·vᵀ·v).
+    /// τ/(1 + τ·vᵀ·v).
     variance: f64,
     /// ln(1 + τ·vᵀ·v).
     log_determinant: f64,
@@ -377,13 +351,12 @@ impl WhiteSources {
         self.columns.ncols() == 0
     }
 
-    /// Returns vᵀ·w of each position and column w of M·L⁻¹·y.
+    /// vᵀ·w of each position.
     pub fn products(&self, white: &ArrayView2<f64>) -> Array2<f64> {
         self.columns.t().dot(white)
     }
 }
 
-/// Averages fits over sources by their evidence.
 fn average(ratio: f64, tried: &mut [(f64, f64, SourceFit)]) -> ChannelFit {
     let best = tried.iter().fold(f64::NEG_INFINITY, |best, (evidence, ..)| best.max(*evidence));
     tried.iter_mut().for_each(|(evidence, _, source)| source.weight = (*evidence - best).exp());

@@ -1,4 +1,4 @@
-//! Prior of the contact force by the forces of the presses.
+//! Prior of the contact force by the calibration forces.
 
 use super::presses::Presses;
 use super::prior::Prior;
@@ -6,10 +6,9 @@ use crate::force_prior::ForceRange;
 use crate::recording::is_one_force;
 use palpate_numerics::mean_and_variance;
 
-/// Largest contact force over that of the calibration, where the response is not proportional.
+/// Largest contact force over the calibration's, for a nonlinear response.
 const HARDEST: f64 = 3.0;
 
-/// Moments and range of the calibration forces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PressForces {
     /// Mean and standard deviation of φ, in newtons.
@@ -17,12 +16,11 @@ pub(super) struct PressForces {
     pub sd_n: f64,
     /// φ of [`HARDEST`], in newtons.
     pub hardest_n: f64,
-    /// Range of contact forces; `None` where the moments define the prior.
+    /// `None` where the moments define the prior.
     pub range: Option<ForceRange>,
 }
 
 impl PressForces {
-    /// Computes the moments, and the range from `stated` or by extrapolation ([`ForceRange::of_presses`]).
     pub fn new(presses: &Presses, prior: &Prior, stated: Option<ForceRange>) -> Self {
         let pressed = || presses.force_n.iter().filter(|force_n| **force_n != 0.0);
         let responses_n = || pressed().map(|force_n| prior.response_n(*force_n));

@@ -1,8 +1,7 @@
-//! Learning of influence functions from presses of recorded force.
+//! Learning of influence functions from presses.
 //!
-//! Two families of priors compete at held-out positions: smooth functions, and point sensors at unknown
-//! positions ([`Prior::source`]). Hyperparameters maximize the log evidence. A variance factor from the
-//! held-out errors corrects the process variance. Outliers are excluded, and the rest is learnt again.
+//! Smooth functions and point sensors at unknown positions ([`Prior::source`]) compete at held-out positions,
+//! with hyperparameters of largest log evidence.
 
 use super::drift::{DriftCourse, END, START};
 use super::drift_fit::DriftFit;
@@ -25,39 +24,33 @@ use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{bisect, mean};
 use std::sync::Arc;
 
-/// Most presses in the search for kernel and length scales.
+/// Most presses of the hyperparameter search.
 pub(crate) const MOST_SEARCHED: usize = 150;
 /// Most presses of a fit, with time cubic in their number; more are condensed.
 pub(crate) const MOST_PRESSES: usize = 1000;
-/// Least distinct positions for hold-out.
 const LEAST_TO_JUDGE: usize = 6;
-/// Number of folds: every fifth position is held out.
+/// Every fifth position is held out.
 pub(crate) const FOLDS: usize = 5;
 
-/// Prior, noise and presses of a surface, estimated from a recording.
 pub(super) struct Learnt {
-    /// All presses of the channels in use.
+    /// All presses.
     pub pressed: Presses,
-    /// Presses of the fit: all, or condensed ones.
+    /// Presses of the fit.
     presses: Presses,
-    /// Drift subtracted from `presses`.
     drift: Option<DriftFit>,
     pub prior: Prior,
-    /// Channels that change, from 0.
+    /// Changing channels, from 0.
     pub live: Vec<usize>,
-    /// Noise and signal of the channels in use.
     fits: Vec<ChannelFit>,
-    /// Candidate sensor positions, in metres.
     sensors_m: Vec<Vec<f64>>,
-    /// Variance factor of the process, estimated at held-out positions.
+    /// Variance factor of the process.
     widening: f64,
-    /// Outliers: rows from 0, ascending.
     pub set_aside: Vec<usize>,
 }
 
 impl Learnt {
-    /// Learns from a recording, or returns the result of an earlier fit of the task. Returns `None` where
-    /// forces do not separate influences from offsets, or no channel changes.
+    /// Learns, or returns an earlier result of the task; `None` where forces do not separate influences from
+    /// offsets, or no channel changes.
     pub fn of_task(
         task: FitTask,
         structure: Structure,
@@ -82,15 +75,14 @@ impl Learnt {
             Self::without_outliers(setup, recording, structure, most_presses, noise, watch)
         };
         let Some(learnt) = learn(None)? else { return Ok(None) };
-        // Outliers resemble local noise and vice versa: noise is estimated without outliers, then outliers
-        // are found with it.
+        // Outliers resemble local noise and vice versa: noise is estimated without outliers, and outliers
+        // with this noise.
         match learnt.noise_by_place(watch)? {
             None => Ok(Some(learnt)),
             Some(noise) => learn(Some(&noise)),
         }
     }
 
-    /// Learns with outliers excluded.
     fn without_outliers(
         setup: &Setup,
         recording: &Recording,
@@ -99,7 +91,6 @@ impl Learnt {
         noise: Option<&PlaceNoise>,
         watch: Watch,
     ) -> Result<Option<Self>, MeasuredError> {
-        /// Rounds of exclusion, and the largest excluded share of all rows.
         const ROUNDS: usize = 4;
         const MOST_SET_ASIDE: f64 = 0.1;
         let learn = |set_aside: &[usize]| {
@@ -181,17 +172,15 @@ impl Learnt {
         Ok(Some(Self { pressed, presses, drift, prior, live, fits, sensors_m, widening, set_aside }))
     }
 
-    /// Returns the standard deviation of each channel's noise.
     pub fn noise_sd(&self) -> Vec<f64> {
         self.fits.iter().map(|fit| fit.noise_variance().sqrt()).collect()
     }
 
-    /// Returns the loadings of common-mode errors.
     pub fn shared_errors(&self) -> Result<Vec<f64>, MeasuredError> {
         Ok(loadings(&self.presses, &self.prior, &self.fits, &self.sensors_m)?)
     }
 
-    /// Returns offsets, and influences at `places_m` per newton of φ.
+    /// Offsets, and influences per newton of φ.
     pub fn functions(&self, places_m: &[Vec<f64>], watch: Watch) -> Result<Vec<Functions>, MeasuredError> {
         let mut functions =
             all_functions(&self.prior, &self.presses, &self.fits, &self.sensors_m, places_m, watch)?;
@@ -212,8 +201,7 @@ impl Learnt {
         Ok(functions)
     }
 
-    /// Returns the offset of every channel in use at `times`, as fractions of the recording; `None` without
-    /// drift.
+    /// Offsets at `times`, as fractions of the recording; `None` without drift.
     pub fn offsets_at(&self, times: &[f64]) -> Result<Option<Vec<Vec<f64>>>, MeasuredError> {
         if self.prior.drift == 0.0 {
             return Ok(None);
@@ -232,13 +220,12 @@ impl Learnt {
         Ok(Some(all))
     }
 
-    /// Returns the change of every offset from the first row to the last; empty without drift.
+    /// Changes of offsets from the first row to the last; empty without drift.
     pub fn drifts(&self) -> Result<Vec<f64>, MeasuredError> {
         let ends = self.offsets_at(&[START, END])?.unwrap_or_default();
         Ok(ends.into_iter().map(|offsets| offsets[1] - offsets[0]).collect())
     }
 
-    /// Returns the offset of every channel in use at `times`, constant without drift.
     pub fn offsets_at_or_constant(&self, times: &[f64]) -> Result<Vec<Vec<f64>>, MeasuredError> {
         if let Some(drifting) = self.offsets_at(times)? {
             return Ok(drifting);
@@ -247,14 +234,13 @@ impl Learnt {
         Ok(constant.into_iter().map(|offsets| vec![offsets[0].0; times.len()]).collect())
     }
 
-    /// Returns the log evidence of other readings of these presses, maximized over the scatter.
+    /// Log evidence of other readings, maximized over the scatter.
     pub fn log_evidence(
         &self,
         setup: &Setup,
         recording: &Recording,
         watch: Watch,
     ) -> Result<f64, MeasuredError> {
-        /// Stride of sensor positions: fewer give nearly equal evidence.
         const ONE_OF: usize = 5;
         let Some(presses) = Presses::of_recording(setup, recording, Repeats::Consecutive, &[]) else {
             return Ok(f64::NEG_INFINITY);
@@ -269,9 +255,8 @@ impl Learnt {
         Ok(search.best_of(priors, &few)?.0)
     }
 
-    /// Returns the first rows of outlying presses.
     fn outliers(&self, watch: Watch) -> Result<Vec<usize>, MeasuredError> {
-        /// Outliers per round: one by one would take long.
+        /// One by one would take long.
         const AT_ONCE: usize = 3;
         let test = OutlierTest { prior: &self.prior, fits: &self.fits, sensors_m: &self.sensors_m };
         if self.presses.len() == self.pressed.len() {
@@ -281,9 +266,7 @@ impl Learnt {
         }
     }
 
-    /// Estimates position-dependent noise; `None` where the evidence does not support it.
     fn noise_by_place(&self, watch: Watch) -> Result<Option<PlaceNoise>, MeasuredError> {
-        /// Stride of sensor positions: fewer give nearly equal noise.
         const ONE_OF: usize = 5;
         let searched = self.pressed.thinned(MOST_SEARCHED);
         let few: Vec<Vec<f64>> = self.sensors_m.iter().step_by(ONE_OF).cloned().collect();
@@ -291,7 +274,7 @@ impl Learnt {
     }
 }
 
-/// Variance factor for a process scale from few positions: that of Student's t over the normal density.
+/// Variance factor for a scale from few positions: that of Student's t over the normal density.
 fn few_positions(prior: &Prior, presses: &Presses) -> f64 {
     /// Student's t has a variance above 2 degrees of freedom.
     const LEAST: usize = 3;
@@ -305,15 +288,14 @@ fn few_positions(prior: &Prior, presses: &Presses) -> f64 {
 
 /// Variance factor for correlated errors of the channels.
 ///
-/// A wrong position or force makes all channels scatter with the force; half of this scatter is assumed to
-/// shift the position. The factor makes the position as uncertain as by one channel, not by the mean of all.
+/// Wrong positions or forces make all channels scatter with force; half of this is assumed to shift the
+/// position.
 fn dependence(prior: &Prior, presses: &Presses) -> f64 {
     const MOVES_POSITION: f64 = 0.5;
     let scattered = mean(presses.force_n.iter().map(|force_n| 1.0 - 1.0 / prior.scatter_of(*force_n)));
     1.0 + scattered * (MOVES_POSITION * presses.centre.len() as f64 - 1.0).max(0.0)
 }
 
-/// Functions of all channels, in order.
 fn all_functions(
     prior: &Prior,
     presses: &Presses,
@@ -332,23 +314,19 @@ fn all_functions(
     Ok(all.into_iter().map(|(_, functions)| functions).collect())
 }
 
-/// Prior with the largest log evidence of its family.
 struct Found {
     prior: Prior,
     fits: Vec<ChannelFit>,
     sensors_m: Vec<Vec<f64>>,
 }
 
-/// Prior with its score at held-out positions.
 struct Judged {
     found: Found,
-    /// Log density of the held-out presses.
     score: f64,
     widening: f64,
 }
 
 impl Judged {
-    /// Holds out every fifth position in turn; the score is 0 with too few positions.
     fn new(found: Found, presses: &Presses, watch: Watch) -> Result<Self, MeasuredError> {
         const MOST: f64 = 25.0;
         let positions_m = presses.positions_m();
@@ -383,7 +361,7 @@ impl Judged {
 }
 
 impl Found {
-    /// Adds squared errors of presses `held`, predicted from `kept`, with the variances of noise and process.
+    /// Adds squared errors of presses `held`, predicted from `kept`, and their variances.
     fn add_errors(
         &self,
         presses: &Presses,
@@ -409,36 +387,35 @@ impl Found {
     }
 }
 
-/// Candidate nonlinearities δ.
+/// Candidates of δ.
 const NONLINEARITIES: [f64; 5] = [0.03, 0.1, 0.3, 1.0, 3.0];
-/// Candidate variances of drift over noise.
+/// Candidates of κ.
 const DRIFTS: [f64; 3] = [10.0, 100.0, 1e3];
 /// Least gain of log evidence for a tenfold drift.
 const LEAST_MORE: f64 = 3.0;
-/// Candidate variances of scatter at the mean square force, over noise.
+/// Candidates of μ.
 const SCATTERS: [f64; 5] = [1.0, 4.0, 16.0, 64.0, 256.0];
-/// Candidate exponents of the response.
+/// Candidates of γ.
 const RESPONSES: [f64; 4] = [0.5, 0.75, 1.33, 2.0];
-/// Least gain of log evidence for a smoother kernel, which claims more certainty between presses.
+/// Least gain for a smoother kernel, which claims more certainty between presses.
 const LEAST_SMOOTHER: f64 = 10.0;
-/// Least gain of log evidence for a departure from offset + force × influence.
+/// Least gain for a departure from offset + force × influence.
 const LEAST_GAIN: f64 = 10.0;
 
-/// Search for the prior of largest log evidence.
 struct Search<'a> {
     presses: &'a Presses,
     extent: Extent,
     structure: Structure,
     noise: Option<&'a PlaceNoise>,
     watch: Watch<'a>,
-    /// Powers of ten of ρ around those of the last prior.
+    /// Powers of ten of ρ, near the last prior's.
     decades: (i32, i32),
 }
 
 impl Search<'_> {
-    /// Log evidence of all channels, with ρ near that of the last prior.
+    /// Log evidence of all channels, with ρ near the last prior's.
     fn total(&mut self, prior: &Prior, sensors_m: &[Vec<f64>]) -> Result<f64, Cancelled> {
-        /// Largest change of ρ between priors, in powers of ten.
+        /// In powers of ten.
         const ABOUT: i32 = 2;
         self.watch.round()?;
         let (from, to) = self.decades;
@@ -457,8 +434,7 @@ impl Search<'_> {
         self.total(prior, sensors_m)
     }
 
-    /// Maximizes the evidence of a smooth prior: kernel, length scales, drift, scatter, response and
-    /// nonlinearity in turn.
+    /// Searches kernel, length scales, drift, scatter, response and nonlinearity in turn.
     fn smooth(&mut self) -> Result<Found, Cancelled> {
         let noise_by_place = self.noise.cloned();
         let rough = Prior { noise_by_place, ..Prior::smooth(self.extent, self.presses) };
@@ -491,7 +467,7 @@ impl Search<'_> {
         Ok(self.found(prior, &[]))
     }
 
-    /// Returns a prior with drift where it is identifiable and gains more than [`LEAST_GAIN`] over `best`.
+    /// Prior with a drift that is identifiable and gains [`LEAST_GAIN`].
     fn drift(
         &mut self,
         best: f64,
@@ -516,7 +492,7 @@ impl Search<'_> {
         Ok(found.filter(|(total, _)| *total > best + LEAST_GAIN))
     }
 
-    /// Returns a prior with noise that grows with force where it gains more than [`LEAST_GAIN`] over `best`.
+    /// Prior with a scatter that gains [`LEAST_GAIN`].
     fn scatter(
         &mut self,
         best: f64,
@@ -542,8 +518,7 @@ impl Search<'_> {
         Ok(best.expect("at least one prior is tried"))
     }
 
-    /// Response to the force: linear, unless another exponent gains [`LEAST_GAIN`] or the structure requires
-    /// one.
+    /// Linear, unless another exponent gains [`LEAST_GAIN`].
     fn response(&mut self, best: f64, linear: Prior) -> Result<(f64, Prior), Cancelled> {
         let (mut found, mut prior) =
             self.best_of(RESPONSES.map(|response| Prior { response, ..linear.clone() }), &[])?;
@@ -565,13 +540,11 @@ impl Search<'_> {
         self.climb_lengths(prior)
     }
 
-    /// Maximizes the evidence of point sensors: kind of source, then smooth part and length scale. Returns
-    /// `None` with too few presses or positions for the polynomials.
+    /// Maximizes the evidence of point sensors; `None` with too few presses or positions for the polynomials.
     fn sources(&mut self, smooth: &Prior) -> Result<Option<Found>, Cancelled> {
-        /// η², and ℓ in lengths of the surface; a plane always needs a smooth part.
+        /// η² and ℓ, in lengths of the surface; a plane needs a smooth part.
         const SHARES: [f64; 4] = [0.0, 1e-4, 1e-2, 1.0];
         const LENGTHS: [f64; 4] = [0.1, 0.2, 0.4, 0.8];
-        /// Stride of sensor positions for drift and scatter.
         const ONE_OF: usize = 5;
         let sensors_m = everywhere(self.extent);
         // With fewer, nearly each press or position is a coefficient, and residuals do not determine the
@@ -627,14 +600,13 @@ impl Search<'_> {
         Ok(Some(self.found(prior, &sensors_m)))
     }
 
-    /// Refines the fits under a prior.
     fn found(&self, prior: Prior, sensors_m: &[Vec<f64>]) -> Found {
         let evidence = Evidence::new(self.presses, &prior, sensors_m);
         let fits = evidence.best_decades(ALL_DECADES).map(|fits| evidence.refined(fits)).unwrap_or_default();
         Found { prior, fits, sensors_m: sensors_m.to_vec() }
     }
 
-    /// Increases the log evidence along the logarithm of one length scale at a time.
+    /// Climbs along one length scale at a time.
     fn climb_lengths(&mut self, mut prior: Prior) -> Result<(f64, Prior), Cancelled> {
         let (shortest_m, longest_m) = (1e-3 * self.extent.length_m(), 10.0 * self.extent.length_m());
         let mut best = self.total(&prior, &[])?;
@@ -663,9 +635,8 @@ impl Search<'_> {
     }
 }
 
-/// Candidate sensor positions over the whole surface.
 fn everywhere(extent: Extent) -> Vec<Vec<f64>> {
-    /// Count along a line; below, along the longer side of a plane.
+    /// Count along a line; below, along a plane's longer side.
     const ALONG: usize = 600;
     const OF_PLANE: usize = 30;
     let middles =

@@ -1,10 +1,8 @@
-//! Calibration of intervals from few presses by leave-one-position-out.
+//! Leave-one-position-out calibration of intervals from few presses, which leave hyperparameters uncertain.
 //!
-//! The posterior treats hyperparameters as known, though few presses leave them uncertain. Each position is
-//! left out in turn, the rest is learnt, and the omitted presses are located. With press x, estimate x̂ and h
-//! the half-width of the 95 % interval towards x, z = 1.96·(x − x̂)/h is standard normal for calibrated
-//! intervals. The mean of z² divides the log-likelihood, as χ² over its degrees of freedom does for
-//! overdispersion (McCullagh and Nelder, *Generalized Linear Models*, 1989).
+//! With press x, estimate x̂ and h the half-width of the 95 % interval towards x, z = 1.96·(x − x̂)/h is
+//! standard normal for calibrated intervals. The mean of z² divides the log-likelihood, as for overdispersion
+//! (McCullagh and Nelder, *Generalized Linear Models*, 1989).
 
 use super::presses::FEW;
 use super::{ForceLinearLocator, MOST_PRESSES, fit_condensed};
@@ -16,11 +14,11 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::Cancelled;
 use palpate_numerics::{NORMAL_95, mean};
 
-/// Presses below [`FEW`] where the weight reaches 1.
+/// Presses below [`FEW`] at full weight.
 const FEWER: f64 = 10.0;
-/// Least number of positions: fewer leave too little to learn from.
+/// Fewer leave too little to learn from.
 const LEAST: usize = 7;
-/// Bound of z², as one press may be an outlier.
+/// One press may be an outlier.
 const MOST_SQUARE: f64 = 25.0;
 
 /// Weight of the correction: 1 for few presses, 0 for many.
@@ -28,8 +26,7 @@ pub(super) fn weight(presses: usize) -> f64 {
     ((FEW - presses as f64) / FEWER).clamp(0.0, 1.0)
 }
 
-/// Returns the further divisor of the log-likelihood for a fit of `presses` presses, repeats counted once.
-/// Returns `None` with many presses, too few positions, or without a valid fit of the rest.
+/// Further divisor of the log-likelihood; `None` with many presses, few positions or no valid fit.
 pub(super) fn factor(
     task: FitTask,
     structure: Structure,
@@ -61,7 +58,7 @@ pub(super) fn factor(
     Ok((!squares.is_empty()).then(|| 1.0 + weight * (mean(squares) - 1.0).max(0.0)))
 }
 
-/// z² of a press, the mean of both coordinates on a plane; `None` without an interval of positive length.
+/// z² of a press, averaged over coordinates; `None` without an interval.
 fn square(locator: &ForceLinearLocator, row: &Row, extent: Extent) -> Option<f64> {
     let contact = locator.posterior(&row.reading).contact;
     let told = contact.uncertainty?;

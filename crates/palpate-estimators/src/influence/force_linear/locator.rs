@@ -1,5 +1,4 @@
-//! Locator of a force-linear surface: posterior over a grid of positions, integrated over the force
-//! ([`super::seen`]).
+//! Locator of a force-linear surface: posterior over a grid, integrated over the force ([`super::seen`]).
 
 use super::broad_scan::{BroadScan, ChannelAtPlace};
 use super::drift::DriftCourse;
@@ -28,21 +27,19 @@ use palpate_numerics::regression::Kernel;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Offsets and influence functions of the channels in use, tabulated over the grid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Tables {
-    /// Offset of each channel, in its unit.
     offsets: Vec<f64>,
-    /// Standard deviation σ of each channel's noise, in its unit.
+    /// σ, in the channel's unit.
     noise_sd: Vec<f64>,
-    /// ω of each channel, over σ².
+    /// ω over σ².
     offset_variances: Vec<f64>,
-    /// f over σ at each node, per newton; index (x·count_y + y)·channels + c.
+    /// f over σ per newton, at index (x·count_y + y)·channels + c.
     values: Vec<f64>,
-    /// v over σ² at each node, per newton squared.
+    /// v over σ², per newton squared.
     variances: Vec<f64>,
-    /// β over σ² at each node, per newton.
+    /// β over σ², per newton.
     covariances: Vec<f64>,
 }
 
@@ -66,8 +63,8 @@ impl Tables {
         }
     }
 
-    /// Returns whether the posterior variance of a contact's reading, summed over channels, exceeds the noise
-    /// variance of two channels at half of the nodes. Otherwise common-mode errors do not matter.
+    /// Returns whether the posterior variance of a contact's reading exceeds two channels' noise at half of
+    /// the nodes.
     pub fn are_open(&self, force_n: f64) -> bool {
         const LEAST: f64 = 2.0;
         let open = |variances: &[f64]| force_n * force_n * variances.iter().sum::<f64>();
@@ -76,57 +73,50 @@ impl Tables {
     }
 }
 
-/// Serialized part of a locator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Stored {
     pub x: Axis,
     pub y: Axis,
-    /// Least and greatest coordinates of the presses, in metres; empty in files without them.
+    /// Least and greatest coordinates, in metres; empty in files without them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outermost_m: Vec<(f64, f64)>,
-    /// Number of channels of a reading; below, indices of those in use, from 0.
+    /// Channels of a reading; below, those in use, from 0.
     pub channels: usize,
     pub live: Vec<usize>,
     pub functions: Tables,
-    /// Known contact force, in newtons.
     pub known_force_n: Option<f64>,
-    /// Mean and standard deviation of φ of the presses, in newtons.
+    /// Mean and standard deviation of φ of the presses.
     pub mean_force_n: f64,
     pub force_sd_n: f64,
-    /// Largest φ of a contact in newtons, without a range.
+    /// Largest φ of a contact without a range.
     pub hardest_n: f64,
-    /// Range of contact forces; `None` for a normal prior by the presses.
+    /// `None` for a normal prior by the presses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_range: Option<ForceRange>,
-    /// Squared residual, in variances, at which a reading is `outside_model`.
+    /// Squared residual, in variances, from which a reading is `outside_model`.
     pub residual_limit: f64,
-    /// Score at which the [distributed-contact test](crate::spread) rejects a point contact.
+    /// Score from which a contact is [distributed](crate::spread).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spread_limit: Option<f64>,
-    /// Prior selected by the calibration.
     pub prior: Prior,
-    /// Excluded rows, from 0.
     pub set_aside: Vec<usize>,
-    /// Requested structure.
     #[serde(default)]
     pub structure: Structure,
-    /// Number of presses of the fit.
     pub presses: usize,
-    /// Degrees of freedom of each channel's noise.
     pub noise_freedom: f64,
     #[serde(default)]
     pub false_alarm_rate: FalseAlarmRate,
     /// Overdispersion: divisor of the log-likelihood.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub channels_as_one: f64,
-    /// Loadings of the channels in use on common-mode errors; empty where these are small.
+    /// Loadings on common-mode errors.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shared_errors: Vec<f64>,
-    /// Change of each offset from the first row to the last; empty without drift, and in files without it.
+    /// Changes from first to last row; empty without drift, and in files without it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub drifts: Vec<f64>,
-    /// Saturation of the channels; the functions are those of linearized readings.
+    /// The functions are those of linearized readings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub saturation: Option<Saturation>,
 }
@@ -139,55 +129,50 @@ fn is_one(value: &f64) -> bool {
     *value == 1.0
 }
 
-/// Locator of a force-linear surface, by tabulated offsets and influence functions.
+/// Locator by offsets and influence functions without a model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct ForceLinearLocator {
     pub(super) stored: Stored,
     /// Prior of φ.
     pub(super) force_prior: ForcePrior,
-    /// f, v and β, eight channels side by side.
+    /// f, v and β.
     pub(super) layers: Layers,
     /// ω.
     pub(super) open: Vec<Lanes>,
-    /// r: independent fraction of each channel's posterior variance.
+    /// r: independent share of the posterior variance.
     pub(super) own: Vec<Lanes>,
-    /// u: loadings on common-mode errors; empty without them.
+    /// u: loadings on common-mode errors.
     pub(super) shared: Vec<Lanes>,
     pub(super) scan: CellScan,
-    /// Greatest distance of each node's influences from its neighbours' along and across, per newton and over
-    /// the noise.
+    /// Greatest distances from neighbours' influences, per newton.
     pub(super) lengths: Vec<[f64; 2]>,
-    /// Critical value of the squared relative reading of noise.
+    /// Critical value of the square of noise.
     noise_bound: f64,
-    /// Critical value of the reduction of this square by the best contact.
+    /// Critical value of the square's reduction by a contact.
     detection_bound: f64,
-    /// Whether offsets separate an untouched board from contacts.
     tells_untouched: bool,
 }
 
-/// Scatter of presses in proportion to the response to their force, added to the noise.
+/// Scatter of presses in proportion to their response, added to the noise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scatter {
-    /// Root mean square force of the presses, in newtons.
+    /// Root mean square force, in newtons.
     pub force_n: f64,
-    /// Index of each channel in use, from 0, with its standard deviation of scatter under this force, in its
-    /// unit.
+    /// Channels in use, from 0, with their standard deviations under this force, in their unit.
     pub sd: Vec<(usize, f64)>,
 }
 
-/// Coarse search over the cells of the grid.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum CellScan {
-    /// Lower bounds, by the variances of the largest φ.
+    /// Bounds by the variances of the largest φ.
     Bounded(Scan),
-    /// Approximate costs, by the variances of each node's own φ.
+    /// Costs by the variances of each node's φ.
     Broad(BroadScan),
 }
 
-/// Standard deviation of the normal force prior, over that of the presses.
+/// Standard deviation of the force prior over the presses'.
 const FORCE_SPREAD: f64 = 2.0;
-/// Layers of f, v and β.
 pub(super) const VALUES: usize = 0;
 pub(super) const VARIANCES: usize = 1;
 pub(super) const COVARIANCES: usize = 2;
@@ -217,7 +202,6 @@ impl Stored {
         locator
     }
 
-    /// Prior of φ by the range of forces, or by the moments of the presses.
     fn force_prior(&self) -> ForcePrior {
         match self.force_range {
             Some(range) => {
@@ -234,7 +218,6 @@ impl Stored {
         }
     }
 
-    /// r of each channel in use.
     fn own_shares(&self) -> Vec<f64> {
         if self.shared_errors.is_empty() {
             return vec![1.0; self.live.len()];
@@ -242,7 +225,6 @@ impl Stored {
         own_shares(&self.shared_errors, self.prior.extent)
     }
 
-    /// Validates the content of a file.
     fn check(&self) -> Result<(), LocatorFault> {
         let numbers = |what, list: &[f64], good: fn(f64) -> bool, bound| {
             LocatorFault::check_numbers(what, list.iter().copied(), good, bound)
@@ -325,17 +307,14 @@ impl From<ForceLinearLocator> for Stored {
     }
 }
 
-/// Table values at a node.
 #[derive(Clone, Copy, Debug)]
 struct Place<'a> {
-    /// f, v and β of each channel, over the noise.
     values: &'a [f64],
     variances: &'a [f64],
     covariances: &'a [f64],
 }
 
 impl ForceLinearLocator {
-    /// Divides the log-likelihood of readings by a further factor.
     pub(super) fn with_likelihood_divided_by(self, factor: f64, recording: &Recording) -> Self {
         let channels_as_one = factor * self.stored.channels_as_one;
         let open =
@@ -345,7 +324,6 @@ impl ForceLinearLocator {
         locator
     }
 
-    /// Adds saturation to a locator of linearized readings; `channels` are those of the ranges, from 0.
     pub(super) fn with_saturation(mut self, saturation: &Saturation, channels: &[usize]) -> Self {
         let range_of = |c: &usize| channels.binary_search(c).map_or(f64::MAX, |i| saturation.ranges[i]);
         let ranges = self.stored.live.iter().map(range_of).collect();
@@ -355,59 +333,56 @@ impl ForceLinearLocator {
         self
     }
 
-    /// Sets the false-alarm rate.
     pub(crate) fn with_false_alarm_rate(mut self, rate: FalseAlarmRate) -> Self {
         self.stored.false_alarm_rate = rate;
         self.bound_noise();
         self
     }
 
-    /// Returns kernel and length scales, in metres, of the smooth part; `None` without one.
+    /// Kernel and length scales, in metres, of the smooth part; `None` without one.
     pub fn correlation(&self) -> Option<(Kernel, &[f64])> {
         (self.stored.prior.smooth_part > 0.0)
             .then_some((self.stored.prior.kernel, &self.stored.prior.lengths_m))
     }
 
-    /// Returns the offset of each channel, in its unit; 0 for channels not in use.
+    /// Offset of each channel, in its unit; 0 if not in use.
     pub fn offsets(&self) -> Vec<f64> {
         let mut offsets = vec![0.0; self.stored.channels];
         self.channels().for_each(|(c, offset, _)| offsets[c] = offset);
         offsets
     }
 
-    /// Returns the false-alarm rate of untouched readings.
+    /// False-alarm rate of untouched readings.
     pub fn false_alarm_rate(&self) -> FalseAlarmRate {
         self.stored.false_alarm_rate
     }
 
-    /// Returns the kind of point sensors; `None` for smooth influences.
+    /// Kind of point sensors; `None` for smooth influences.
     pub fn source(&self) -> Option<Source> {
         self.stored.prior.source
     }
 
-    /// Returns the exponent of the response to force; 1 for a linear response.
+    /// Exponent of the response to force; 1 if linear.
     pub fn response(&self) -> f64 {
         self.stored.prior.response
     }
 
-    /// Returns the share by which the largest reading falls short of proportionality; `None` without
-    /// saturation.
+    /// Relative shortfall of the largest reading; `None` without saturation.
     pub fn saturation_share(&self) -> Option<f64> {
         self.stored.saturation.as_ref().map(|saturation| saturation.share)
     }
 
-    /// Returns the drift of each channel in use, from 0: the change of offset from the first row to the last,
-    /// in its unit. Empty without drift, and for files without it.
+    /// Changes of offsets from the first row to the last; empty without drift, and for files without it.
     pub fn drifts(&self) -> Vec<(usize, f64)> {
         self.stored.live.iter().copied().zip(self.stored.drifts.iter().copied()).collect()
     }
 
-    /// Returns the course of the drift; `None` without drift.
+    /// Course of the drift; `None` without drift.
     pub fn drift_course(&self) -> Option<DriftCourse> {
         (self.stored.prior.drift > 0.0).then_some(self.stored.prior.drift_course)
     }
 
-    /// Returns the scatter that grows with force; `None` without it.
+    /// Scatter that grows with force; `None` without it.
     pub fn scatter(&self) -> Option<Scatter> {
         let Prior { scatter, force_scale_n, .. } = self.stored.prior;
         let channel = |(c, _, noise): (usize, f64, f64)| (c, scatter.sqrt() * noise);
@@ -415,13 +390,13 @@ impl ForceLinearLocator {
             .then(|| Scatter { force_n: force_scale_n, sd: self.channels().map(channel).collect() })
     }
 
-    /// Returns the extent of the surface.
+    /// Extent of the surface.
     pub fn extent(&self) -> Extent {
         self.stored.prior.extent
     }
 
-    /// Returns least and greatest noise standard deviation over the grid, relative to an untouched board,
-    /// with positions; `None` for uniform noise.
+    /// Least and greatest noise standard deviation over an untouched board's, with positions; `None` if
+    /// uniform.
     pub fn noise_by_place(&self) -> Option<[(f64, Position); 2]> {
         self.stored.prior.noise_by_place.as_ref()?;
         let [x, y] = self.axes();
@@ -435,7 +410,7 @@ impl ForceLinearLocator {
         Some([places().min_by(by_noise)?, places().max_by(by_noise)?])
     }
 
-    /// Returns the fitted structure.
+    /// Fitted structure.
     pub fn structure(&self) -> Structure {
         match (&self.stored.saturation, self.response() == 1.0) {
             (Some(_), _) => Structure::ForceSaturating,
@@ -444,34 +419,33 @@ impl ForceLinearLocator {
         }
     }
 
-    /// Returns the requested structure.
+    /// Requested structure.
     pub fn asked_structure(&self) -> Structure {
         self.stored.structure
     }
 
-    /// Returns the excluded rows, from 0.
+    /// Excluded rows, from 0.
     pub fn set_aside(&self) -> &[usize] {
         &self.stored.set_aside
     }
 
-    /// Returns the number of presses of the fit.
+    /// Number of presses of the fit.
     pub fn presses(&self) -> usize {
         self.stored.presses
     }
 
-    /// Returns whether the noise estimate is unreliable: too few repeats and untouched rows.
+    /// Returns whether the noise estimate is unreliable, with few repeats and untouched rows.
     pub fn noise_is_hardly_told(&self) -> bool {
         self.stored.noise_freedom <= LEAST_FREEDOM
     }
 
-    /// Returns index (from 0), offset and noise of each channel in use, in its unit.
+    /// Index, offset and noise of each channel in use.
     pub fn channels(&self) -> impl Iterator<Item = (usize, f64, f64)> {
         let Tables { offsets, noise_sd, .. } = &self.stored.functions;
         self.stored.live.iter().zip(offsets).zip(noise_sd).map(|((c, offset), noise)| (*c, *offset, *noise))
     }
 
-    /// Returns influence functions and standard deviations at the nodes, per newton of the
-    /// [`response`](Self::response).
+    /// Influence functions and standard deviations at the nodes, per newton of [`response`](Self::response).
     pub fn influences_at_nodes(&self) -> InfluencesAtNodes {
         let Tables { offsets, noise_sd, values, variances, .. } = &self.stored.functions;
         let [x, y] = self.axes();
@@ -490,8 +464,7 @@ impl ForceLinearLocator {
         }
     }
 
-    /// Returns the Cramér–Rao bound by the fitted influences and noise; influences are constant beyond the
-    /// grid.
+    /// Cramér–Rao bound by the fitted influences and noise.
     pub fn cramer_rao_bound(&self, extent: Extent) -> CramerRaoBound<'_> {
         let channel = |channel| {
             let response: Arc<dyn ResponseFunction> = Arc::new(LearntResponse { locator: self, channel });
@@ -500,7 +473,7 @@ impl ForceLinearLocator {
         CramerRaoBound::of_responses(extent, (0..self.stored.live.len()).map(channel))
     }
 
-    /// Returns the smallest detectable force by the detection test.
+    /// Smallest detectable force.
     pub fn lightest_touch(&self) -> LightestTouch<'_> {
         let coordinates = if self.stored.y.count > 1 { 2 } else { 1 };
         let detection = Detection {
@@ -520,8 +493,7 @@ impl ForceLinearLocator {
         LightestTouch::new(detection, self.stored.false_alarm_rate, noise_sds, Box::new(change))
     }
 
-    /// Returns the standard deviation of each channel's noise and offset together; `None` for channels not in
-    /// use.
+    /// Standard deviations of noise and offset together; `None` for channels not in use.
     pub fn noise_of_channels(&self) -> Vec<Option<f64>> {
         let Tables { noise_sd, offset_variances, .. } = &self.stored.functions;
         let mut sds = vec![None; self.stored.channels];
@@ -531,7 +503,6 @@ impl ForceLinearLocator {
         sds
     }
 
-    /// Influences at a position over the noise, constant beyond the grid.
     fn influences_at(&self, position: Position) -> Vec<f64> {
         let node =
             |axis: Axis, at_m: f64| ((at_m - axis.start) / axis.step).clamp(0.0, (axis.count - 1) as f64);
@@ -561,7 +532,6 @@ impl ForceLinearLocator {
         }
     }
 
-    /// Computes the distances of each node's influences from its neighbours'.
     fn find_lengths(&mut self) {
         let distances =
             |place: usize| greatest_distances(self.axes(), place, |other| self.way_between(place, other));
@@ -612,8 +582,7 @@ impl ForceLinearLocator {
         self.stored.x.count * self.stored.y.count
     }
 
-    /// Distance between the influences of two nodes, per newton and over the noise; up to a factor where the
-    /// force is unknown.
+    /// Distance of influences over the noise, up to a factor for an unknown force.
     fn way_between(&self, place: usize, other: usize) -> f64 {
         let pairs = || self.place(place).values.iter().zip(self.place(other).values);
         let (fg, gg): (f64, f64) = pairs().fold((0.0, 0.0), |(fg, gg), (f, g)| (fg + f * g, gg + g * g));
@@ -621,8 +590,7 @@ impl ForceLinearLocator {
         pairs().map(|(f, g)| (f - scale * g).powi(2)).sum::<f64>().sqrt()
     }
 
-    /// Returns whether the square of a relative reading, and its reduction by the best contact, are below
-    /// their critical values.
+    /// Detection test by a reading's square and its reduction by the best contact.
     fn is_no_contact(&self, relative: &[f64]) -> bool {
         let open = &self.stored.functions.offset_variances;
         let square: f64 = relative.iter().zip(open).map(|(d, open)| d * d / (1.0 + open)).sum();
@@ -640,16 +608,14 @@ impl ForceLinearLocator {
         (0..self.places()).all(|place| taken(place) <= self.detection_bound)
     }
 
-    /// Returns whether an untouched board is distinguishable from contacts of half the mean calibration
-    /// force.
+    /// Returns whether contacts of half the mean force are distinguishable from noise.
     ///
-    /// Without rows of force 0, uncertain offsets may hide such contacts: then no reading is `no_contact`.
+    /// Without rows of force 0, uncertain offsets may prevent it: then no reading is `no_contact`.
     pub fn tells_untouched(&self) -> bool {
         self.tells_untouched
     }
 
-    /// Returns true unless uncertain offsets hide such contacts at more than a quarter of the nodes where
-    /// exact offsets would not.
+    /// Returns false where uncertain offsets alone hide such contacts at over a quarter of the nodes.
     fn offsets_are_told(&self) -> bool {
         const SHARE: f64 = 0.5;
         const HIDDEN: usize = 4;
@@ -665,7 +631,6 @@ impl ForceLinearLocator {
         is_told(&|c| self.stored.functions.offset_variances[c]) || !is_told(&|_| 0.0)
     }
 
-    /// Computes the critical values of the detection test.
     fn bound_noise(&mut self) {
         let freedom = self.stored.noise_freedom;
         // Few degrees of freedom ν underestimate the noise: χ² over an estimated variance is F, with a tail
@@ -678,7 +643,6 @@ impl ForceLinearLocator {
         self.tells_untouched = self.offsets_are_told();
     }
 
-    /// Extent of the directions of contact readings.
     fn directions(&self) -> Directions {
         let [x, y] = self.axes();
         let direction = |i: usize, j: usize| {
@@ -707,7 +671,7 @@ impl ForceLinearLocator {
         Directions { length: 0.5 * boundary, area }
     }
 
-    /// Reading minus the offsets, linearized, over the noise.
+    /// Linearized reading minus the offsets, over the noise.
     pub(super) fn relative(&self, reading: &[f64]) -> Vec<f64> {
         let Tables { offsets, noise_sd, .. } = &self.stored.functions;
         let deviations = self.stored.live.iter().zip(offsets).map(|(c, offset)| reading[*c] - offset);
@@ -720,12 +684,11 @@ impl ForceLinearLocator {
         }
     }
 
-    /// Variance factor of an estimated noise, as of Student's t: ν/(ν − 2).
+    /// Variance factor of estimated noise, ν/(ν − 2) as of Student's t.
     pub(super) fn noise(&self) -> f64 {
         self.stored.noise_freedom / (self.stored.noise_freedom - 2.0)
     }
 
-    /// Noise variance at grid coordinates, over that of an untouched board.
     pub(super) fn noise_at(&self, [x, y]: [f64; 2]) -> f64 {
         self.noise_at_position(Position { x_m: self.stored.x.value(x), y_m: self.stored.y.value(y) })
     }
@@ -735,13 +698,11 @@ impl ForceLinearLocator {
         prior.noise_at(&[x_m, y_m][..prior.extent.dimensions()])
     }
 
-    /// Grid coordinates of node `place`.
     fn node(&self, place: usize) -> [f64; 2] {
         let across = self.stored.y.count;
         [(place / across) as f64, (place % across) as f64]
     }
 
-    /// φ of the known force.
     pub(super) fn known_response_n(&self) -> Option<f64> {
         self.stored.known_force_n.map(|force_n| self.stored.prior.response_n(force_n))
     }
@@ -753,7 +714,6 @@ impl ForceLinearLocator {
     }
 }
 
-/// Reading of a channel minus its offset, over the local noise, as a function of the contact.
 struct LearntResponse<'a> {
     locator: &'a ForceLinearLocator,
     channel: usize,
@@ -764,7 +724,6 @@ impl LearntResponse<'_> {
         self.locator.influences_at(position)[self.channel]
     }
 
-    /// Noise standard deviation at a position, over that of an untouched board.
     fn noise(&self, position: Position) -> f64 {
         self.locator.noise_at_position(position).sqrt()
     }
@@ -777,7 +736,7 @@ impl ResponseFunction for LearntResponse<'_> {
     }
 
     fn gradient(&self, Contact { position, force_n }: Contact) -> ResponseGradient {
-        /// Half the difference, in grid steps.
+        /// In grid steps.
         const REACH: f64 = 0.05;
         let [x, y] = self.locator.axes();
         let response_n = self.locator.stored.prior.response_n(force_n) / self.noise(position);

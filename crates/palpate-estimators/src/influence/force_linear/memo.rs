@@ -1,4 +1,4 @@
-//! Memo of the influence functions that the fits of one task share.
+//! Memo of influence functions.
 
 use super::learning::Learnt;
 use crate::influence::config::Structure;
@@ -9,7 +9,7 @@ use std::fmt;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Influence functions learnt during one task, for the drift, the fit and its folds.
+/// Influence functions that the drift, fit and folds of one task share.
 pub(crate) struct LearningMemo<'a> {
     setup: &'a Setup,
     learnt: Mutex<HashMap<Key, Option<Arc<Learnt>>>>,
@@ -27,8 +27,7 @@ impl<'a> LearningMemo<'a> {
         self.setup
     }
 
-    /// Returns the stored functions of a recording, or stores the result of `learn`. Functions of another
-    /// setup are not stored.
+    /// Returns stored functions, or stores the result of `learn` for the memo's setup.
     pub(super) fn get_or_learn<E>(
         &self,
         (setup, recording): (&Setup, &Recording),
@@ -56,7 +55,7 @@ impl fmt::Debug for LearningMemo<'_> {
     }
 }
 
-/// 64-bit hash of all numbers of the rows: two of a thousand recordings collide with probability 3e-14.
+/// Two of a thousand recordings collide with probability 3e-14.
 fn hash_of_rows(recording: &Recording) -> u64 {
     let mut hasher = DefaultHasher::new();
     for Row { position, force_n, nuisances, time_s, reading } in &recording.rows {

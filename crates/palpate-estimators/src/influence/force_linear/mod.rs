@@ -1,8 +1,5 @@
-//! Force-linear method for a surface without a model: reading = offset + force · influence function of the
-//! position.
-//!
-//! [`learning`] estimates the functions from the calibration; [`locator`] inverts them over a grid of
-//! positions.
+//! Force-linear method: reading = offset + force · influence function of the position, learnt ([`learning`])
+//! and inverted ([`locator`]) without a model.
 
 mod beyond_presses;
 mod broad_scan;
@@ -53,11 +50,9 @@ use prior::Prior;
 use saturation_fit::Linearization;
 
 const LEAST_POSITIONS: usize = 2;
-/// Most grid nodes along a line; below, along either axis of a plane.
 const MOST_ALONG: usize = 400;
 const MOST_OF_PLANE: usize = 60;
 
-/// Returns the largest number of grid nodes for a surface.
 pub(crate) const fn most_nodes(extent: Extent) -> usize {
     match extent {
         Extent::Line { .. } => MOST_ALONG,
@@ -65,8 +60,8 @@ pub(crate) const fn most_nodes(extent: Extent) -> usize {
     }
 }
 
-/// Fits influence functions and offsets. Returns `None` where forces do not separate influences from offsets,
-/// no channel changes, or [`Structure::Auto`] rejects the force-linear structure.
+/// Fits influence functions and offsets; `None` where forces do not separate them, or [`Structure::Auto`]
+/// rejects the structure.
 pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLinearLocator>, MeasuredError> {
     if structure == Structure::ForceSaturating {
         return fit_saturating(task);
@@ -78,7 +73,6 @@ pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLin
     }))
 }
 
-/// Fits [`Structure::ForceLinear`] to linearized readings.
 fn fit_saturating(task: FitTask) -> Result<Option<ForceLinearLocator>, MeasuredError> {
     let Some(linearization) = Linearization::new(task)? else { return Ok(None) };
     let task = FitTask { recording: &linearization.recording, ..task };
@@ -86,7 +80,7 @@ fn fit_saturating(task: FitTask) -> Result<Option<ForceLinearLocator>, MeasuredE
     Ok(locator.map(|locator| locator.with_saturation(&linearization.saturation, linearization.channels())))
 }
 
-/// Returns whether the log evidence is largest without saturation, or no influence functions can be learnt.
+/// Returns whether a zero saturation has the largest log evidence.
 pub(crate) fn is_unsaturated(task: FitTask) -> Result<bool, MeasuredError> {
     Ok(Linearization::new(task)?.is_none_or(|linearization| linearization.saturation.share == 0.0))
 }
@@ -97,7 +91,6 @@ pub(super) fn has_forces(setup: &Setup, recording: &Recording) -> bool {
     presses.is_some_and(|presses| presses.distinct_forces() >= 2)
 }
 
-/// [`fit`] with the presses condensed to about `most`.
 fn fit_condensed(
     task: FitTask,
     structure: Structure,
@@ -157,19 +150,16 @@ fn fit_condensed(
     Ok(Some(locator))
 }
 
-/// Returns the divisor of the log-likelihood (overdispersion) for few presses: all channels share
-/// hyperparameters and positions of large posterior variance.
+/// Divisor of the log-likelihood (overdispersion) for few presses, as channels share their hyperparameters.
 ///
-/// The constants give 95 % coverage on strips with 5 to 24 presses. [`left_out`] multiplies the divisor where
-/// 7 or more positions allow it.
+/// The constants give 95 % coverage on strips with 5 to 24 presses.
 fn channels_as_one(presses: &Presses) -> f64 {
     const FEWEST: f64 = 4.0;
     const MOST: f64 = 1.8;
     1.0 + left_out::weight(presses.len()) * ((presses.len() as f64 / FEWEST).clamp(1.0, MOST) - 1.0)
 }
 
-/// Returns the offsets at the rows of `asked`; `None` where rows lack times, or presses show no drift or no
-/// separable influence functions.
+/// Offsets at the rows of `asked`; `None` without times, drift or separable influence functions.
 pub(super) fn offset_course(
     task: FitTask,
     structure: Structure,
@@ -193,7 +183,6 @@ pub(super) fn offset_course(
     Ok(Some(course))
 }
 
-/// Returns the grid axes: the span of the calibrated positions, extended by their largest gap.
 fn axes(presses: &Presses, prior: &Prior, extent: Extent) -> [Axis; 2] {
     let positions_m = presses.positions_m();
     let axis = |k: usize, most: usize| {

@@ -1,8 +1,5 @@
-//! Outlier test of presses.
-//!
-//! Externally studentized residuals: the leave-one-out error of a press over a deviation estimated without it
-//! (Cook and Weisberg, *Residuals and Influence in Regression*, 1982, section 2.2.1). The false-alarm rate is
-//! 1 % per recording.
+//! Outlier test by externally studentized residuals (Cook and Weisberg, *Residuals and Influence in
+//! Regression*, 1982, section 2.2.1), with 1 % false alarms per recording.
 
 use super::evidence::ChannelFit;
 use super::presses::Presses;
@@ -13,7 +10,6 @@ use ndarray::Zip;
 use palpate_numerics::watch::Watch;
 use palpate_numerics::{NotPositiveDefinite, chi_squared_critical_value};
 
-/// Outlier test of presses under a fitted prior.
 pub(super) struct OutlierTest<'a> {
     pub prior: &'a Prior,
     pub fits: &'a [ChannelFit],
@@ -21,8 +17,7 @@ pub(super) struct OutlierTest<'a> {
 }
 
 impl OutlierTest<'_> {
-    /// Returns the first rows of the `at_once` worst outliers. `tested` is the number of presses tested in
-    /// all, with a common noise estimate.
+    /// First rows of the worst outliers; all `tested` presses share the noise estimate.
     pub fn worst(
         &self,
         presses: &Presses,
@@ -30,7 +25,7 @@ impl OutlierTest<'_> {
         at_once: usize,
     ) -> Result<Vec<usize>, NotPositiveDefinite> {
         const TAIL: f64 = 1e-2;
-        /// Least share of the press's own noise in its error variance.
+        /// Share of the own noise in an error's variance.
         const LEAST_TOLD: f64 = 1e-6;
         let n = presses.len();
         let Residuals { squares, told, freedom } =
@@ -62,8 +57,7 @@ impl OutlierTest<'_> {
         Ok(found.into_iter().take(at_once).map(|i| presses.row[i]).collect())
     }
 
-    /// Returns the first rows of outliers among many presses, tested in parts of neighbours until none
-    /// remains.
+    /// Tests parts of neighbouring presses until no outlier remains.
     pub fn by_parts(&self, presses: &Presses, watch: Watch) -> Result<Vec<usize>, MeasuredError> {
         /// Presses of a part: time is quadratic, and distant presses add no information.
         const PART: usize = 100;

@@ -1,39 +1,36 @@
-//! Noise that depends on the position.
+//! Position-dependent noise.
 
 use crate::fit::LocatorFault;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// Multiplier of the noise variance, common to all channels: m(a) = exp(q(a) − q₀), at least 1.
+/// Factor of the noise variance, m(a) = exp(q(a) − q₀) ≥ 1.
 ///
-/// q has a [`Shape`] in u and v, the position as fractions of the calibrated span along and across; it is
-/// constant beyond. q₀ is the least q of the calibrated positions, where the noise is that of an untouched
-/// board.
+/// q is a [`Shape`] in u and v, fractions of the calibrated span, and constant beyond. q₀ is the least q of
+/// the calibrated positions, as of an untouched board.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PlaceNoise {
-    /// Least and greatest calibrated coordinates, in metres.
     spans_m: Vec<[f64; 2]>,
     shape: Shape,
-    /// θ by ascending degree, then by descending j.
+    /// θ by ascending degree, then descending j.
     coefficients: Vec<f64>,
     /// q₀.
     least: f64,
 }
 
-/// Form of ln m over the surface.
+/// Form of ln m.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub(super) enum Shape {
     /// q = Σ θ_jk·cos(jπu)·cos(kπv), 0 < j + k ≤ degree.
     Smooth { degree: usize },
-    /// q = ½·θ·tanh((u − at)/width), or in v: two parts of the surface.
+    /// q = ½·θ·tanh((u − at)/width), or in v.
     Step { coordinate: usize, at: f64, width: f64 },
 }
 
 impl Shape {
-    /// Number of estimated parameters.
     pub fn parameters(self, dimensions: usize) -> usize {
         match self {
             Self::Smooth { degree } => terms(dimensions, degree),
@@ -49,7 +46,6 @@ impl Shape {
     }
 }
 
-/// Number of products of cosines up to a degree.
 fn terms(dimensions: usize, degree: usize) -> usize {
     if dimensions == 1 { degree } else { (1..=degree).map(|degree| degree + 1).sum() }
 }
@@ -64,24 +60,21 @@ fn spans_m(places_m: &[&[f64]]) -> Vec<[f64; 2]> {
     (0..dimensions).map(span_m).collect()
 }
 
-/// Largest degree along a line, and on a plane.
 const MOST_DEGREES: [usize; 2] = [5, 3];
 
 impl PlaceNoise {
-    /// Creates uniform noise: θ = 0.
+    /// Uniform noise: θ = 0.
     pub fn even(places_m: &[&[f64]], shape: Shape) -> Self {
         let spans_m = spans_m(places_m);
         let coefficients = vec![0.0; shape.coefficients(spans_m.len())];
         Self { spans_m, shape, coefficients, least: 0.0 }
     }
 
-    /// Largest degree in a number of dimensions.
     pub fn most_degrees(dimensions: usize) -> usize {
         MOST_DEGREES[dimensions - 1]
     }
 
-    /// Returns candidate steps between neighbouring coordinates, with at least two on either side, at most
-    /// `most` per axis.
+    /// Candidate steps with two coordinates or more on either side, at most `most` per axis.
     pub fn steps(places_m: &[&[f64]], most: usize) -> Vec<Shape> {
         let mut steps = Vec::new();
         for (coordinate, [low, high]) in spans_m(places_m).into_iter().enumerate() {
@@ -100,8 +93,7 @@ impl PlaceNoise {
         steps
     }
 
-    /// Moves a step to the quieter end of its gap: noise that is too large there does less harm than too
-    /// small noise.
+    /// Moves a step to the quieter end of its gap, as overestimated noise does less harm.
     pub fn towards_quiet(mut self) -> Self {
         /// In widths; a gap has four.
         const MOVED: f64 = 1.2;
@@ -112,7 +104,6 @@ impl PlaceNoise {
         self
     }
 
-    /// Form of ln m.
     pub fn shape(&self) -> Shape {
         self.shape
     }
@@ -122,7 +113,7 @@ impl PlaceNoise {
         &self.coefficients
     }
 
-    /// Replaces θ, or the first of them.
+    /// Replaces the first θ.
     pub fn with_coefficients(&self, places_m: &[&[f64]], coefficients: &[f64]) -> Self {
         let mut changed = Self { least: 0.0, ..self.clone() };
         changed.coefficients.iter_mut().zip(coefficients).for_each(|(own, other)| *own = *other);
@@ -136,7 +127,7 @@ impl PlaceNoise {
         (self.exponent(place_m) - self.least).max(0.0).exp()
     }
 
-    /// Derivatives of ln m by θ at `asked_m`, one row per position.
+    /// Derivatives of ln m by θ, one row per position.
     pub fn slopes(&self, places_m: &[&[f64]], asked_m: &[Vec<f64>]) -> Array2<f64> {
         let terms_at = |place_m: &[f64]| {
             let mut terms = Vec::with_capacity(self.coefficients.len());
@@ -159,7 +150,7 @@ impl PlaceNoise {
         sum
     }
 
-    /// Passes index and basis function of each θ at a position to `take`.
+    /// Passes the basis functions to `take`, in the order of θ.
     fn for_terms(&self, place_m: &[f64], mut take: impl FnMut(usize, f64)) {
         let share = |k: usize| {
             let [low, high] = self.spans_m[k];
@@ -190,7 +181,6 @@ impl PlaceNoise {
         degrees.enumerate().for_each(|(term, (j, k))| take(term, along[j] * across[k]));
     }
 
-    /// Validates the content of a file.
     pub fn check(&self, dimensions: usize) -> Result<(), LocatorFault> {
         let numbers = |what, list: &[f64]| {
             LocatorFault::check_numbers(what, list.iter().copied(), |_| true, "a finite number")

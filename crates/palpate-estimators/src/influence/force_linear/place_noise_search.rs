@@ -1,10 +1,9 @@
-//! Estimate of position-dependent noise by Fisher scoring of squared residuals.
+//! Position-dependent noise by Fisher scoring.
 //!
-//! Let t be the share of noise in a press's leave-one-out error, d the squared error over its variance, and b
-//! the derivatives of ln m by θ. Both are relative to their channel means, as the channel's noise is
-//! estimated too. The restricted log-likelihood has the gradient ½·Σ t·b·(d − 1) and about the information
-//! ½·Σ t·b·bᵀ (Smyth, J. R. Statist. Soc. B 51, 1989; Smyth, Huele and Verbyla, Statistical Modelling 1,
-//! 2001). Repeats with ν degrees of freedom count as ν errors of t = 1.
+//! Let t be the share of noise in a leave-one-out error, d its square over the variance, and b the
+//! derivatives of ln m by θ, relative to channel means. The restricted log-likelihood has the gradient ½·Σ
+//! t·b·(d − 1) and about the information ½·Σ t·b·bᵀ (Smyth, J. R. Statist. Soc. B 51, 1989; Smyth, Huele and
+//! Verbyla, Statistical Modelling 1, 2001). Repeats count with t = ν, their degrees of freedom.
 
 use super::evidence::{ALL_DECADES, ChannelFit, Evidence};
 use super::place_noise::{PlaceNoise, Shape};
@@ -16,12 +15,11 @@ use ndarray::{Array1, Array2};
 use palpate_numerics::Cholesky;
 use palpate_numerics::watch::Watch;
 
-/// Least gain of log evidence for position-dependent noise.
+/// Least gain of log evidence.
 const LEAST_GAIN: f64 = 10.0;
-/// Least gain of log evidence for each parameter.
+/// Least gain per parameter.
 const LEAST_MORE: f64 = 3.0;
 
-/// Search for position-dependent noise, with the other hyperparameters given.
 pub(super) struct PlaceNoiseSearch<'a> {
     pub presses: &'a Presses,
     pub prior: &'a Prior,
@@ -29,38 +27,34 @@ pub(super) struct PlaceNoiseSearch<'a> {
     pub watch: Watch<'a>,
 }
 
-/// Prior with fits and log evidence of all channels.
 struct Fitted {
     prior: Prior,
     fits: Vec<ChannelFit>,
     total: f64,
 }
 
-/// Gradient and information of the log-likelihood by θ.
+/// Gradient and information by θ.
 struct Score {
     slope: Array1<f64>,
     information: Cholesky,
 }
 
 impl Score {
-    /// Scoring step of θ.
     fn way(&self) -> Array1<f64> {
         self.information.solve(&self.slope)
     }
 
-    /// Expected gain of log evidence.
     fn gain(&self) -> f64 {
         0.5 * self.slope.dot(&self.way())
     }
 }
 
 impl PlaceNoiseSearch<'_> {
-    /// Returns the noise with the largest log evidence minus [`LEAST_MORE`] per parameter. Returns `None`
-    /// without a gain of [`LEAST_GAIN`] over uniform noise and over noise that grows with force alone.
+    /// Noise of largest log evidence minus [`LEAST_MORE`] per parameter; `None` without a gain of
+    /// [`LEAST_GAIN`] over uniform or force-dependent noise.
     pub fn found(&self) -> Result<Option<PlaceNoise>, MeasuredError> {
-        /// Scoring steps, each with the channels' noise estimated again.
         const STEPS: usize = 4;
-        /// Candidate steps along a coordinate; below, the number that is fitted.
+        /// Candidate steps per coordinate; below, those fitted.
         const MOST_STEPS: usize = 16;
         const BEST_STEPS: usize = 3;
         let places_m = self.presses.positions_m();
@@ -119,7 +113,6 @@ impl PlaceNoiseSearch<'_> {
         Ok(best.map(|(_, noise)| noise.towards_quiet()))
     }
 
-    /// Fits under a prior, refined around the fits `about` where given.
     fn fitted(&self, prior: Prior, about: Option<&[ChannelFit]>) -> Option<Fitted> {
         let evidence = Evidence::new(self.presses, &prior, self.sensors_m);
         let coarse = match about {
@@ -131,9 +124,7 @@ impl PlaceNoiseSearch<'_> {
         total.is_finite().then_some(Fitted { prior, fits, total })
     }
 
-    /// Takes a scoring step; `None` where the fit fails.
     fn step(&self, from: &Fitted, places_m: &[&[f64]]) -> Result<Option<Fitted>, MeasuredError> {
-        /// Longest step of a coefficient.
         const LONGEST: f64 = 1.5;
         let Some(noise) = &from.prior.noise_by_place else { return Ok(None) };
         let residuals = Residuals::new(self.presses, &from.prior, &from.fits, self.sensors_m)?;
@@ -147,9 +138,8 @@ impl PlaceNoiseSearch<'_> {
         Ok(self.fitted(prior, Some(&from.fits)))
     }
 
-    /// Gradient and information by the θ of `noise`, from residuals under a prior.
     fn score(&self, at: &Fitted, residuals: &Residuals, noise: &PlaceNoise) -> Result<Score, MeasuredError> {
-        /// Prior precision of θ about 0, for coefficients with little information.
+        /// Prior precision of θ.
         const PRECISION: f64 = 0.05;
         let Fitted { prior, fits, .. } = at;
         let (presses, repeated) = (self.presses, &self.presses.repeated);

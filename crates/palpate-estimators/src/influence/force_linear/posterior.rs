@@ -1,10 +1,9 @@
-//! Posterior of offsets and influence functions.
+//! Posterior of offsets and influence functions, linear functionals of the process.
 //!
-//! Both are linear functionals of the process. With k their covariance with the presses, h their effects of
-//! offset and polynomials, and the symbols of [`super::evidence`], the mean is hᵀ·β + (L⁻¹·k)ᵀ·w and the
-//! variance k₀ − |L⁻¹·k|² + |R⁻ᵀ·(h − Hᵀ·A⁻¹·k)|², in units of s² (universal kriging; Rasmussen and Williams,
-//! eq. 2.41 and 2.42). A source adds its amplitude times its projected functional. Functions of several
-//! sources are averaged; their differences add variance.
+//! With k the covariance with the presses, h the effects of offset and polynomials, and the symbols of
+//! [`super::evidence`], the mean is hᵀ·β + (L⁻¹·k)ᵀ·w and the variance k₀ − |L⁻¹·k|² + |R⁻ᵀ·(h − Hᵀ·A⁻¹·k)|²
+//! over s² (universal kriging; Rasmussen and Williams, eq. 2.41 and 2.42). A source adds its amplitude times
+//! its projected functional; differences between sources add variance.
 
 use super::drift::END;
 use super::evidence::{ChannelFit, Evidence, Restricted, SourceFit, WhiteSources};
@@ -15,35 +14,31 @@ use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis as Dimension, s};
 use palpate_numerics::NotPositiveDefinite;
 use palpate_numerics::watch::Watch;
 
-/// Posterior moments of a channel's offset and influences.
 #[derive(Clone, Debug)]
 pub(super) struct Functions {
     pub offset: f64,
     /// f at each position.
     pub values: Vec<f64>,
     pub offset_variance: f64,
-    /// Variance of f at each position.
     pub variances: Vec<f64>,
-    /// Covariance of f with the offset, at each position.
+    /// Covariances of f with the offset.
     pub covariances: Vec<f64>,
 }
 
-/// Groups channels of equal ratio ρ, which share one factorization.
+/// Groups channels of equal ρ, which share one factorization.
 pub(super) fn of_equal_ratio(fits: &[ChannelFit]) -> Vec<Vec<usize>> {
     let mut channels: Vec<usize> = (0..fits.len()).collect();
     channels.sort_by(|a, b| fits[*a].ratio.total_cmp(&fits[*b].ratio));
     channels.chunk_by(|a, b| fits[*a].ratio == fits[*b].ratio).map(<[usize]>::to_vec).collect()
 }
 
-/// Linear functional of a channel's process: the offset at a time, if any, plus response times influence at a
-/// position.
+/// Offset at a time, if any, plus response times influence at a position.
 struct Functional<'a> {
     time: Option<f64>,
     response: f64,
     place_m: &'a [f64],
 }
 
-/// Functionals per batch.
 const BLOCK: usize = 256;
 
 impl<'a> Functional<'a> {
@@ -55,7 +50,6 @@ impl<'a> Functional<'a> {
         Self { time: None, response: 1.0, place_m }
     }
 
-    /// Noiseless reading of each press.
     fn readings(prior: &Prior, presses: &'a Presses) -> Vec<Self> {
         let responses = prior.responses(presses).into_iter();
         let times_and_places = presses.time.iter().zip(&presses.positions_m);
@@ -64,7 +58,6 @@ impl<'a> Functional<'a> {
     }
 }
 
-/// Functionals with their effects and their covariance with the presses.
 struct Functionals<'a> {
     asked: &'a [Functional<'a>],
     /// h, q × functionals.
@@ -99,7 +92,6 @@ impl<'a> Functionals<'a> {
         Self { asked, effects, covariance, variance }
     }
 
-    /// Functionals of unit sources at `sensors_m`, one row per functional.
     fn of_sources(&self, prior: &Prior, sensors_m: &[Vec<f64>]) -> Array2<f64> {
         let mut of_sources = Array2::zeros((self.asked.len(), sensors_m.len()));
         for (mut row, Functional { response, place_m, .. }) in of_sources.outer_iter_mut().zip(self.asked) {
@@ -111,7 +103,7 @@ impl<'a> Functionals<'a> {
     }
 }
 
-/// Mean and variance of a functional, and its covariance with the first of the batch.
+/// Moments, with the covariance to the batch's first functional.
 #[derive(Clone, Copy, Debug)]
 struct Moments {
     mean: f64,
@@ -119,8 +111,7 @@ struct Moments {
     with_first: f64,
 }
 
-/// Returns offsets and influences of unit response, φ = F̄, for channels of equal ρ. Sensor positions are
-/// refined around the probable ones of `sensors_m`.
+/// Offsets and influences of unit response, for channels of equal ρ.
 pub(super) fn functions(
     prior: &Prior,
     presses: &Presses,
@@ -156,8 +147,7 @@ pub(super) fn functions(
     Ok(functions)
 }
 
-/// Returns mean and variance of the noiseless readings of `others`, each at its own time, for channels of
-/// equal ρ.
+/// Noiseless readings of `others`, for channels of equal ρ.
 pub(super) fn readings(
     prior: &Prior,
     presses: &Presses,
@@ -173,7 +163,6 @@ pub(super) fn readings(
     Ok(channels.iter().zip(moments).map(of_channel).collect())
 }
 
-/// Returns mean and variance of every channel's offset at each time.
 pub(super) fn offsets(
     prior: &Prior,
     presses: &Presses,
@@ -196,7 +185,6 @@ pub(super) fn offsets(
     Ok(all)
 }
 
-/// Posterior of the processes of channels of equal ρ.
 struct Posterior<'a> {
     prior: &'a Prior,
     presses: &'a Presses,
@@ -221,7 +209,6 @@ impl<'a> Posterior<'a> {
         Ok(Self { prior, presses, known, channels })
     }
 
-    /// Moments of functionals of every channel.
     fn moments(&self, asked: &[Functional]) -> Vec<Vec<Moments>> {
         let Self { prior, presses, known, channels } = self;
         let asked = Functionals::new(prior, presses, known.ratio, asked);
@@ -238,14 +225,14 @@ impl<'a> Posterior<'a> {
     }
 }
 
-/// Posterior variance of functionals without sources, over s², common to all channels.
+/// Posterior variances without sources, over s².
 struct Within {
     variance: Vec<f64>,
     with_first: Vec<f64>,
 }
 
 impl Within {
-    /// Sums the moments from L⁻¹·k and R⁻ᵀ·(h − Hᵀ·A⁻¹·k), one column per functional.
+    /// Sums from L⁻¹·k and R⁻ᵀ·(h − Hᵀ·A⁻¹·k).
     fn new(asked: &Functionals, [explained, open]: [&Array2<f64>; 2]) -> Self {
         let mut within =
             Self { variance: asked.variance.clone(), with_first: vec![0.0; asked.variance.len()] };
@@ -263,11 +250,10 @@ impl Within {
     }
 }
 
-/// Presses factored at one ρ.
 struct Known {
     ratio: f64,
     restricted: Restricted,
-    /// M·L⁻¹·y of every channel, and the coefficients of H.
+    /// M·L⁻¹·y and the coefficients of H, by channels.
     white: Array2<f64>,
     coefficients: Array2<f64>,
 }
@@ -280,12 +266,11 @@ impl Known {
     }
 }
 
-/// Candidate sources of a channel.
 #[derive(Clone)]
 struct Sources {
     sensors_m: Vec<Vec<f64>>,
     white: WhiteSources,
-    /// Coefficients of H for L⁻¹·u of each source.
+    /// Coefficients of H for L⁻¹·u.
     coefficients: Array2<f64>,
     fits: Vec<SourceFit>,
 }
@@ -305,12 +290,10 @@ impl Sources {
         Self { fits: fit.sources, ..self }
     }
 
-    /// Refines the positions for channel `c` until the presses hardly resolve neighbours.
+    /// Refines positions until the presses hardly resolve neighbours.
     fn closer(&self, evidence: &Evidence, known: &Known, c: usize) -> Self {
         const ROUNDS: usize = 4;
-        /// Sufficient number of coordinate values among the probable positions.
         const ENOUGH: usize = 12;
-        /// Coordinate values of the next round, on a line and on a plane.
         const NEXT: [usize; 2] = [80, 14];
         let mut found = self.clone().fitted(evidence, known, c);
         for _ in 0..ROUNDS {
@@ -333,8 +316,7 @@ impl Sources {
         found
     }
 
-    /// Span of coordinate k of the probable positions, extended by a step at either end, and its number of
-    /// values.
+    /// Span of probable coordinates, with a step at either end, and number of values.
     fn probable(&self, k: usize) -> (f64, f64, usize) {
         let distinct = |mut values: Vec<f64>| {
             values.sort_by(f64::total_cmp);
@@ -351,7 +333,6 @@ impl Sources {
     }
 }
 
-/// Channel with its sources.
 struct Told {
     c: usize,
     signal: f64,
@@ -359,7 +340,7 @@ struct Told {
 }
 
 impl Told {
-    /// Moments of functionals; `base` are the means without sources.
+    /// `base` are the means without sources.
     fn moments(
         &self,
         prior: &Prior,

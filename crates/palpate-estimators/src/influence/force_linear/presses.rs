@@ -1,4 +1,4 @@
-//! Presses: calibration rows of recorded force, with repeats averaged and readings centred.
+//! Presses: calibration rows of recorded force, with repeats averaged.
 
 use crate::recording::{LEAST_FREEDOM, Recording, is_same_force};
 use crate::setup::Setup;
@@ -8,45 +8,42 @@ use palpate_numerics::{mean, mean_and_variance};
 use std::cmp::Ordering;
 use std::sync::Arc;
 
-/// Rows that count as repeats of one press.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Repeats {
-    /// Consecutive rows of equal position and force, with little drift between them.
+    /// Consecutive rows, with little drift between them.
     Consecutive,
-    /// All rows of equal position and force.
     All,
 }
 
-/// Presses of recorded force.
 #[derive(Clone, Debug)]
 pub(super) struct Presses {
-    /// Position along and, on a plane, across, in metres.
+    /// Along and, on a plane, across.
     pub positions_m: Vec<Vec<f64>>,
     pub force_n: Vec<f64>,
     /// Number of averaged rows.
     pub count: Vec<f64>,
-    /// Fraction of the recording: 0 at its first row, 1 at its last.
+    /// From 0 at the first row to 1 at the last.
     pub time: Vec<f64>,
-    /// First row of each press, from 0.
+    /// First row of each press.
     pub row: Vec<usize>,
-    /// Mean reading of each channel over the recording.
+    /// Mean reading of each channel.
     pub centre: Vec<f64>,
-    /// Mean reading minus the centre, one row per press.
+    /// Mean reading minus the centre.
     pub means: Array2<f64>,
-    /// Variance of each channel's rounding error, as of converters; 0 where none is detected.
+    /// Rounding variance of each channel; 0 where none is detected.
     pub rounding: Vec<f64>,
-    /// Repeats of the whole recording, also in subsets of presses.
+    /// Repeats of the whole recording, also in subsets.
     pub repeated: Arc<Repeated>,
 }
 
-/// Scatter of repeated presses, one row per press.
+/// Scatter of repeats, one row per press.
 #[derive(Clone, Debug)]
 pub(super) struct Repeated {
     pub positions_m: Vec<Vec<f64>>,
     pub force_n: Vec<f64>,
     /// Number of repeats minus one.
     pub freedom: Vec<f64>,
-    /// Squared deviations of each channel from the mean of the repeats.
+    /// Squared deviations from the mean of repeats.
     pub squares: Array2<f64>,
 }
 
@@ -64,12 +61,11 @@ impl RowPress<'_> {
     }
 }
 
-/// Number of presses below which noise, offsets and hyperparameters need prior information.
+/// Number of presses below which noise and hyperparameters need prior information.
 pub const FEW: f64 = 25.0;
 
 impl Presses {
-    /// Collects the presses of a recording without the rows `set_aside`, ascending; `None` where a row has no
-    /// force.
+    /// Collects the presses without the rows `set_aside`; `None` where a force is missing.
     pub fn of_recording(
         setup: &Setup,
         recording: &Recording,
@@ -132,18 +128,16 @@ impl Presses {
         }
     }
 
-    /// Number of presses.
     pub fn len(&self) -> usize {
         self.force_n.len()
     }
 
-    /// Weight of the priors of noise and errors: 1 for few presses, 0 for many.
+    /// Weight of priors: 1 for few presses, 0 for many.
     pub fn fewness(&self) -> f64 {
         const FEWER: f64 = 5.0;
         ((FEW - self.len() as f64) / FEWER).clamp(0.0, 1.0)
     }
 
-    /// Number of distinct forces, including 0.
     pub fn distinct_forces(&self) -> usize {
         let mut forces = self.force_n.clone();
         forces.sort_by(f64::total_cmp);
@@ -151,18 +145,16 @@ impl Presses {
         forces.len()
     }
 
-    /// Returns whether drift is identifiable beside influences that change along the surface.
+    /// Returns whether drift is identifiable.
     ///
-    /// With one force and one pass along the surface, time and position are confounded. Different forces,
-    /// untouched rows far apart in time, or neighbouring positions at different times identify drift. The
-    /// criterion for the last is the mean square of time steps between neighbours over the variance, 2 in
-    /// random order (von Neumann, Annals of Mathematical Statistics 12, 1941).
+    /// With one force and one pass along the surface, time and position are confounded. Different forces or
+    /// untouched rows far apart identify drift, or neighbours at different times: the mean square of time
+    /// steps over the variance, 2 in random order (von Neumann, Annals of Mathematical Statistics 12, 1941).
     pub fn tells_drift(&self) -> bool {
-        /// Standard deviation of the forces over their mean.
+        /// Standard deviation over the mean.
         const LEAST_FORCES: f64 = 0.1;
         /// Fraction of the recording between untouched rows.
         const LEAST_SPAN: f64 = 0.5;
-        /// Mean square of the steps over the variance.
         const LEAST_STEPS: f64 = 0.5;
         let (untouched, mut pressed): (Vec<usize>, Vec<usize>) =
             (0..self.len()).partition(|i| self.force_n[*i] == 0.0);
@@ -192,19 +184,16 @@ impl Presses {
         positions
     }
 
-    /// Degrees of freedom of a channel's noise: rows minus one per position and one for the offset, at least
-    /// [`LEAST_FREEDOM`].
+    /// Rows minus one per position and for the offset, at least [`LEAST_FREEDOM`].
     pub fn noise_freedom(&self) -> f64 {
         let rows = self.count.iter().sum::<f64>();
         (rows - self.positions_m().len() as f64 - 1.0).max(LEAST_FREEDOM)
     }
 
-    /// Largest force, in newtons.
     pub fn greatest_force_n(&self) -> f64 {
         self.force_n.iter().fold(0.0, |most, force_n| most.max(force_n.abs()))
     }
 
-    /// Channels that change by more than rounding, from 0.
     pub fn changing_channels(&self) -> Vec<usize> {
         let changes = |c: &usize| {
             let most = self.means.column(*c).iter().fold(0.0, |most: f64, value| most.max(value.abs()));
@@ -213,7 +202,6 @@ impl Presses {
         (0..self.centre.len()).filter(changes).collect()
     }
 
-    /// Subset of the channels.
     pub fn of_channels(&self, channels: &[usize]) -> Self {
         let of = |values: &[f64]| channels.iter().map(|c| values[*c]).collect();
         Self {
@@ -228,7 +216,6 @@ impl Presses {
         }
     }
 
-    /// Subset of the presses.
     pub fn select(&self, kept: &[usize]) -> Self {
         let of = |values: &[f64]| kept.iter().map(|i| values[*i]).collect();
         Self {
@@ -244,14 +231,13 @@ impl Presses {
         }
     }
 
-    /// Returns at most `most` presses, evenly picked in order.
     pub fn thinned(&self, most: usize) -> Self {
         let kept: Vec<usize> = thinned(self.len(), most).collect();
         self.select(&kept)
     }
 
-    /// Partitions presses `touched` into at most `most` cells of neighbouring positions, with distances in
-    /// length scales. Presses of one position are consecutive in a cell.
+    /// Partitions into at most `most` cells of neighbours, in length scales; presses of one position are
+    /// consecutive.
     pub fn cells(&self, touched: &[usize], most: usize, lengths_m: &[f64]) -> Vec<Vec<usize>> {
         let position_m = |i: usize| self.positions_m[i].as_slice();
         let mut touched = touched.to_vec();
@@ -280,8 +266,7 @@ impl Presses {
         cells
     }
 
-    /// Partitions the presses into parts of neighbours, of about `size` presses and at least `places`
-    /// positions where possible. Untouched presses are distributed over the parts.
+    /// Partitions into neighbours, with about `size` presses and at least `places` positions.
     pub fn parts(&self, size: usize, places: usize, lengths_m: &[f64]) -> Vec<Vec<usize>> {
         let (untouched, touched): (Vec<usize>, Vec<usize>) =
             (0..self.len()).partition(|i| self.force_n[*i] == 0.0);
@@ -303,11 +288,10 @@ impl Presses {
     }
 }
 
-/// Variance step²/12 of rounding to the coarsest power of ten that divides all values; 0 without one.
+/// step²/12 for the coarsest power of ten that divides all values; 0 without one.
 fn rounding_variance(values: &[f64]) -> f64 {
-    /// Coarsest and finest power of ten of the search.
     const POWERS: std::ops::RangeInclusive<i32> = -9..=6;
-    /// Tolerance of a multiple, relative to the step or to binary precision.
+    /// Tolerance relative to the step or to binary precision.
     const WITHIN: f64 = 1e-6;
     let is_step = |step: &f64| {
         let is_multiple = |value: &f64| {
@@ -320,13 +304,13 @@ fn rounding_variance(values: &[f64]) -> f64 {
     POWERS.rev().map(|power| 10f64.powi(power)).find(is_step).map_or(0.0, |step| step * step / 12.0)
 }
 
-/// Times of the rows as fractions of the recording; by row order without times.
+/// Fractions of the recording; by row order without times.
 pub(super) fn relative_times(recording: &Recording) -> Vec<f64> {
     let times = recording.times_or_order();
     shares(&times, &times)
 }
 
-/// Times as fractions of the span of `of`, from 0 to 1.
+/// Fractions of the span of `of`, from 0 to 1.
 pub(super) fn shares(times: &[f64], of: &[f64]) -> Vec<f64> {
     let (first, last) = of
         .iter()

@@ -1,20 +1,17 @@
-//! Prior of influence functions: variation with position, force and time.
+//! Prior of influence functions over position, force and time.
 //!
-//! The reading of channel c is o_c + φ(F)·f_c(a) + drift + noise for the force F at the position a, with
+//! Channel c reads o_c + φ(F)·f_c(a) + drift + noise for the force F at the position a, with
 //!
 //! f_c(a) = Σ_j β_cj·h_j(a) + α_c·g(a − p_c) + s_c/F̄·η·z(a),
 //!
-//! - h: polynomials with flat priors of the coefficients β: a constant; for point sensors, all up to the third
-//!   degree (a beam between loads bends as a cubic, a plate as a biharmonic function, which cubics are);
-//! - g: singular part of the Green's function of a point sensor at the unknown position p_c ([`Source`]), with
-//!   an amplitude α of log-uniform prior;
-//! - z: Gaussian process of unit variance with a Matérn or squared-exponential correlation k.
+//! - h: polynomials with flat priors: a constant; for point sensors all up to cubics, which are biharmonic;
+//! - g: singular part of the Green's function of a point sensor at p_c ([`Source`]), with log-uniform α;
+//! - z: Gaussian process of unit variance and correlation k.
 //!
-//! φ(F) = F̄·(F/F̄)^γ, with F̄ the root mean square force; γ = 1 unless the evidence supports another response of
-//! all positions. A gain that changes with position and force, δ²·k·exp(−(F − F′)²/2F̄²), measures departures.
-//! Drift of each channel is a Gaussian process of time ([`DriftCourse`]), with the variance κ times the noise's
-//! from the first row to the last. Noise has the variance σ²·m(a)·(1 + μ·φ²/F̄²), and σ² without a force: μ stands
-//! for errors of recorded forces and positions, m for noise that depends on the position ([`PlaceNoise`]).
+//! φ(F) = F̄·(F/F̄)^γ, with F̄ the root mean square force. A gain with covariance δ²·k·exp(−(F − F′)²/2F̄²)
+//! measures departures. Drift is a Gaussian process of time ([`DriftCourse`]), of variance κ times the
+//! noise's over the recording. Noise has the variance σ²·m(a)·(1 + μ·φ²/F̄²), and σ² without a force: μ for
+//! errors of forces and positions, m by position ([`PlaceNoise`]).
 
 use super::drift::DriftCourse;
 use super::place_noise::PlaceNoise;
@@ -26,12 +23,10 @@ use palpate_numerics::regression::Kernel;
 use palpate_numerics::root_mean_square;
 use serde::{Deserialize, Serialize};
 
-/// Singular part of a point sensor's influence function, with d the vector from sensor to load in lengths of
-/// the surface.
+/// Singular part of a point sensor's influence function, with d from sensor to load.
 ///
-/// Under a load at the distance |d|, a beam's deflection has the part |d|³, its slope d·|d| and its curvature
-/// (strain) |d|. A plate's deflection has d²·ln|d| and its curvature ln|d| (Timoshenko and Woinowsky-Krieger,
-/// *Theory of Plates and Shells*, 1959, article 37).
+/// A beam's deflection has |d|³, slope d·|d| and curvature (strain) |d|; a plate's deflection d²·ln|d| and
+/// curvature ln|d| (Timoshenko and Woinowsky-Krieger, *Theory of Plates and Shells*, 1959, article 37).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Source {
@@ -44,7 +39,6 @@ pub enum Source {
 }
 
 impl Source {
-    /// Returns the kinds on a line or a plane.
     pub(super) fn all(extent: Extent) -> &'static [Self] {
         match extent {
             Extent::Line { .. } => &[Self::Strain, Self::Slope, Self::Deflection],
@@ -52,9 +46,9 @@ impl Source {
         }
     }
 
-    /// g at the vector `way` from sensor to load, in lengths of the surface.
+    /// g at `way` from sensor to load, in lengths of the surface.
     fn singular_part(self, way: &[f64]) -> f64 {
-        /// Size of a sensor, within which a plate's curvature does not grow.
+        /// Sensor size, which bounds a plate's curvature.
         const SIZE: f64 = 0.01;
         match (self, way) {
             (Self::Strain, [d]) => d.abs(),
@@ -69,7 +63,6 @@ impl Source {
     }
 }
 
-/// Prior common to all channels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Prior {
@@ -77,11 +70,10 @@ pub(super) struct Prior {
     /// F̄.
     pub force_scale_n: f64,
     pub kernel: Kernel,
-    /// Length scale of each coordinate, in metres.
     pub lengths_m: Vec<f64>,
     /// η².
     pub smooth_part: f64,
-    /// Kind of point sensors; `None` for smooth influences.
+    /// `None` for smooth influences.
     pub source: Option<Source>,
     /// δ: relative change of an influence with force.
     pub nonlinearity: f64,
@@ -94,13 +86,13 @@ pub(super) struct Prior {
     /// μ.
     #[serde(default)]
     pub scatter: f64,
-    /// m; `None` for uniform noise.
+    /// m; `None` if uniform.
     #[serde(default)]
     pub noise_by_place: Option<PlaceNoise>,
 }
 
 impl Prior {
-    /// Creates a smooth prior over a quarter of the surface's length, linear in force, without drift.
+    /// Smooth over a quarter of the surface, linear in force, without drift.
     pub fn smooth(extent: Extent, presses: &Presses) -> Self {
         let spans_m = [Some(extent.length_m()), extent.width_m()].into_iter().flatten();
         Self {
@@ -119,13 +111,11 @@ impl Prior {
         }
     }
 
-    /// Returns whether influences are independent of the force.
     pub fn is_separable(&self) -> bool {
         self.nonlinearity == 0.0
     }
 
-    /// Returns whether readings follow the force: beyond these exponents all forces are alike, or one
-    /// dominates.
+    /// Returns false for exponents where all forces are alike, or one dominates.
     pub fn has_response(&self) -> bool {
         (0.2..=5.0).contains(&self.response)
     }
@@ -152,7 +142,7 @@ impl Prior {
         self.response_to(force_n) * self.force_scale_n
     }
 
-    /// Force and its variance, from those of φ.
+    /// Force and variance, from those of φ.
     pub fn force_of_response(&self, response_n: f64, variance_n2: f64) -> (f64, f64) {
         if self.response == 1.0 || response_n <= 0.0 {
             return (response_n, variance_n2);
@@ -162,7 +152,6 @@ impl Prior {
         (force_n, variance_n2 * slope * slope)
     }
 
-    /// Validates the content of a file.
     pub fn check(&self) -> Result<(), LocatorFault> {
         let numbers = |what, list: &[f64], good: fn(f64) -> bool, bound| {
             LocatorFault::check_numbers(what, list.iter().copied(), good, bound)
@@ -181,7 +170,7 @@ impl Prior {
         presses.force_n.iter().map(|force_n| self.response_to(*force_n)).collect()
     }
 
-    /// Lower triangle of the covariance of the presses over s², without noise and drift: n × n.
+    /// Lower triangle over s², without noise and drift.
     pub fn covariance(&self, presses: &Presses) -> Array2<f64> {
         let n = presses.len();
         let responses = self.responses(presses);
@@ -202,12 +191,11 @@ impl Prior {
         covariance
     }
 
-    /// Noise variance of a press over that of an untouched row.
+    /// Noise variance over an untouched row's.
     pub fn relative_noise(&self, force_n: f64, place_m: &[f64]) -> f64 {
         if force_n == 0.0 { 1.0 } else { self.scatter_of(force_n) * self.noise_at(place_m) }
     }
 
-    /// [`Self::relative_noise`] of press `i`.
     pub fn relative_noise_of(&self, presses: &Presses, i: usize) -> f64 {
         self.relative_noise(presses.force_n[i], &presses.positions_m[i])
     }
@@ -222,12 +210,12 @@ impl Prior {
         self.noise_by_place.as_ref().map_or(1.0, |noise| noise.multiplier(place_m))
     }
 
-    /// Covariance of the drift at two times, over the noise variance.
+    /// Covariance over the noise variance.
     pub fn drift_between(&self, a: f64, b: f64) -> f64 {
         self.drift * self.drift_course.covariance(a, b)
     }
 
-    /// Covariance of f at a position with the presses, in units of s²/F̄.
+    /// Covariance of f in units of s²/F̄.
     pub fn influence_covariance(&self, presses: &Presses, responses: &[f64], place_m: &[f64]) -> Array1<f64> {
         let positions = presses.positions_m.iter().zip(responses);
         positions.map(|(at_m, phi)| phi * self.smooth_part * self.correlation(place_m, at_m)).collect()
@@ -238,7 +226,6 @@ impl Prior {
         self.smooth_part
     }
 
-    /// Number of polynomials h.
     pub fn polynomials(&self) -> usize {
         match (self.source, self.extent) {
             (None, _) => 1,
@@ -265,7 +252,7 @@ impl Prior {
         all[..self.polynomials()].to_vec()
     }
 
-    /// H: readings of presses by the offset and each polynomial, n × (1 + polynomials).
+    /// H: n × (1 + polynomials).
     pub fn effects(&self, presses: &Presses) -> Array2<f64> {
         let mut effects = Array2::ones((presses.len(), 1 + self.polynomials()));
         for ((mut row, place_m), phi) in
@@ -276,7 +263,7 @@ impl Prior {
         effects
     }
 
-    /// g at a position for sensors at `sensors_m`; empty without a source.
+    /// g for each sensor; empty without a source.
     pub fn sources_at(&self, place_m: &[f64], sensors_m: &[Vec<f64>]) -> Array1<f64> {
         let Some(source) = self.source else { return Array1::zeros(0) };
         let scale = 1.0 / self.extent.length_m();
@@ -289,7 +276,7 @@ impl Prior {
         sensors_m.iter().map(at).collect()
     }
 
-    /// Readings of presses by sources at `sensors_m`, one column per sensor.
+    /// Readings by sources, one column per sensor.
     pub fn sources(&self, presses: &Presses, sensors_m: &[Vec<f64>]) -> Array2<f64> {
         let mut sources =
             Array2::zeros((presses.len(), if self.source.is_some() { sensors_m.len() } else { 0 }));

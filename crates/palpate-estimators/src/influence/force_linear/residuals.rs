@@ -1,6 +1,4 @@
-//! Leave-one-out residuals of presses.
-//!
-//! With P = Lᵀ⁻¹·M·L⁻¹ the residual of press i is (P·y)_i/P_ii, and its variance s²/P_ii (Rasmussen and
+//! Leave-one-out residuals of presses: (P·y)_i/P_ii with variance s²/P_ii and P = Lᵀ⁻¹·M·L⁻¹ (Rasmussen and
 //! Williams, eq. 5.12).
 
 use super::evidence::{ChannelFit, Evidence};
@@ -10,13 +8,12 @@ use super::prior::Prior;
 use ndarray::{Array1, Array2};
 use palpate_numerics::NotPositiveDefinite;
 
-/// Leave-one-out residuals, one row per press and one column per channel.
+/// One row per press and one column per channel.
 pub(super) struct Residuals {
     /// Squared residuals over their variance.
     pub squares: Array2<f64>,
-    /// Fraction of this variance from the press's own noise.
+    /// Share of the own noise in this variance.
     pub told: Array2<f64>,
-    /// Degrees of freedom of a channel.
     pub freedom: f64,
 }
 

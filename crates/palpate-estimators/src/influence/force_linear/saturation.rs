@@ -1,25 +1,23 @@
-//! Saturation: readings of large forces fall short of proportionality.
+//! Saturation of readings at large forces.
 //!
-//! A deviation x from the offset, proportional to the force, is read as y = x/(1 + s/(1 − s)·|x|/X), the
-//! hyperbolic law of a Langmuir isotherm and of resistive foams. The share s is the relative shortfall of the
-//! largest deviation X. With the largest read deviation Y = (1 − s)·X, the inverse is x = y/(1 − s·|y|/Y).
-//! All channels share s; each has its own Y, from the presses. Beyond Y the inverse continues along its
-//! tangent.
+//! A deviation x proportional to the force is read as y = x/(1 + s/(1 − s)·|x|/X), the hyperbolic law of a
+//! Langmuir isotherm and of resistive foams. All channels share s, the relative shortfall of the largest
+//! deviation X. With Y = (1 − s)·X the inverse is x = y/(1 − s·|y|/Y), with a tangent beyond Y.
 
 use serde::{Deserialize, Serialize};
 
-/// Saturation of the channels in use; see [the module](self).
+/// Saturation of the channels in use.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Saturation {
-    /// s, at least 0 and below 1.
+    /// s, from 0 to below 1.
     pub share: f64,
-    /// Y of each channel in use, in its unit.
+    /// Y of each channel.
     pub ranges: Vec<f64>,
 }
 
 impl Saturation {
-    /// Returns x for a deviation y of a channel in use.
+    /// x of a deviation y.
     pub fn linearized(&self, channel: usize, deviation: f64) -> f64 {
         let range = self.ranges[channel];
         let within = deviation.abs().min(range);
@@ -27,7 +25,7 @@ impl Saturation {
         deviation.signum() * (linear + (deviation.abs() - within) * self.slope(channel, within))
     }
 
-    /// Returns dx/dy.
+    /// dx/dy.
     pub fn slope(&self, channel: usize, deviation: f64) -> f64 {
         let range = self.ranges[channel];
         (1.0 - self.share * deviation.abs().min(range) / range).powi(-2)

@@ -1,8 +1,8 @@
-//! Estimate of the saturation from presses.
+//! Estimate of the saturation.
 //!
-//! The share s maximizes the log evidence of the linearized presses plus the log Jacobian, Σ ln(dx/dy) over
-//! rows and channels (Box and Cox, *Journal of the Royal Statistical Society B* 26, 1964). The prior is that
-//! of the raw presses, apart from its scatter: saturation resembles scatter with force.
+//! s maximizes the log evidence of linearized presses plus the log Jacobian, Σ ln(dx/dy) (Box and Cox,
+//! *Journal of the Royal Statistical Society B* 26, 1964). The prior is that of raw presses without scatter,
+//! which resembles saturation.
 
 use super::learning::{Learnt, MOST_PRESSES, MOST_SEARCHED};
 use super::presses::relative_times;
@@ -14,7 +14,6 @@ use crate::recording::Recording;
 use crate::thinning::thinned;
 use std::sync::Arc;
 
-/// Recording with linearized readings.
 pub(super) struct Linearization {
     pub recording: Recording,
     pub saturation: Saturation,
@@ -22,7 +21,7 @@ pub(super) struct Linearization {
 }
 
 impl Linearization {
-    /// Estimates the saturation; `None` where no influence functions can be learnt.
+    /// Estimates the saturation; `None` without influence functions.
     pub fn new(task: FitTask) -> Result<Option<Self>, MeasuredError> {
         let Some(learnt) = Learnt::of_task(task, Structure::ForceLinear, MOST_PRESSES)? else {
             return Ok(None);
@@ -36,18 +35,17 @@ impl Linearization {
         Ok(Some(Self { recording, saturation, learnt }))
     }
 
-    /// Channels of the saturation's ranges, from 0.
+    /// Channels of the ranges, from 0.
     pub fn channels(&self) -> &[usize] {
         &self.learnt.live
     }
 }
 
-/// Maximizes the log evidence over the share, to 0.6 %.
+/// Share of largest log evidence, to 0.6 %.
 fn most_likely_share(
     mut log_evidence: impl FnMut(f64) -> Result<f64, MeasuredError>,
 ) -> Result<f64, MeasuredError> {
-    /// Shares of a coarse search, and steps of its refinement. Policy: shares above 0.7 are another response
-    /// than saturation.
+    /// Coarse search and refinement; shares above 0.7 are another response than saturation.
     const TRIED: [f64; 5] = [0.0, 0.1, 0.2, 0.4, 0.6];
     const STEPS: [f64; 4] = [0.05, 0.025, 0.0125, 0.00625];
     let mut best = (f64::NEG_INFINITY, 0.0);
@@ -74,11 +72,9 @@ fn most_likely_share(
 /// Deviations of readings from the offsets of their time.
 struct PressDeviations<'a> {
     recording: &'a Recording,
-    /// Channels in use, from 0.
     channels: &'a [usize],
-    /// Offset of each channel in use at each row.
+    /// Offsets by channel and row.
     offsets: Vec<Vec<f64>>,
-    /// Rows of the fit.
     rows: Vec<usize>,
 }
 
@@ -90,7 +86,7 @@ impl<'a> PressDeviations<'a> {
         Ok(Self { recording, channels: &learnt.live, offsets, rows })
     }
 
-    /// Rows of the presses in the hyperparameter search, with all repeats.
+    /// All repeats of the presses of the hyperparameter search.
     fn thinned(&self, learnt: &Learnt) -> Self {
         let first_rows = &learnt.pressed.row;
         let kept: Vec<usize> = thinned(first_rows.len(), MOST_SEARCHED).collect();
@@ -104,7 +100,6 @@ impl<'a> PressDeviations<'a> {
         self.recording.rows[row].reading[self.channels[channel]] - self.offsets[channel][row]
     }
 
-    /// Saturation for a share, with the ranges of these rows.
     fn saturation(&self, share: f64) -> Saturation {
         let largest = |channel: usize| {
             let sizes = self.rows.iter().map(|row| self.deviation(*row, channel).abs());
@@ -124,7 +119,6 @@ impl<'a> PressDeviations<'a> {
         recording
     }
 
-    /// Log evidence of these rows, linearized, plus the log Jacobian.
     fn log_evidence(
         &self,
         learnt: &Learnt,

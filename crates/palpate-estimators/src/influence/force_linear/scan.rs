@@ -1,13 +1,12 @@
-//! Coarse search by lower bounds of the cost, eight nodes side by side.
+//! Coarse search by lower bounds of the cost.
 //!
-//! With weights w from the largest variances of a node, the least chi-squared over forces is Σ w·d² − (Σ
-//! w·f·d)²/Σ w·f²: two products per channel and node. Reading the table from memory dominates the time.
+//! With weights w from a node's largest variances, the least chi-squared over forces is Σ w·d² − (Σ w·f·d)²/Σ
+//! w·f².
 
 use crate::influence::inversion::CellBlocks;
 use crate::influence::lanes::{LANES, Lanes};
 use palpate_numerics::simd::Eight;
 
-/// Products of every node, in blocks of eight.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Scan {
     places: usize,
@@ -16,17 +15,16 @@ pub(super) struct Scan {
     weights: Vec<Lanes>,
     /// w·f, channel by channel.
     products: Vec<Lanes>,
-    /// Σ w·f² plus the prior precision of φ.
+    /// Σ w·f² plus the precision of φ.
     squares: Vec<Lanes>,
-    /// Lower bound of the log determinant and of the width of φ's density, as −2·ln.
+    /// Lower bound of log determinant and width.
     constants: Vec<Lanes>,
-    /// Prior mean and precision of φ; below, the known φ.
+    /// Prior mean and precision of φ; below, a known φ.
     expected: [f64; 2],
     known: Option<f64>,
 }
 
 impl Scan {
-    /// `channel` returns f of a channel at a node, with its least and greatest variance.
     pub fn new(
         places: usize,
         channels: usize,
@@ -68,7 +66,7 @@ impl CellBlocks for Scan {
         self.places
     }
 
-    /// Least chi-squared, cost and φ of each node of a block.
+    /// Least chi-squared, cost and φ of each node.
     #[inline(always)]
     fn look<V: Eight>(&self, block: usize, reading: &[f64]) -> [V; 3] {
         let of_block = block * self.channels..(block + 1) * self.channels;

@@ -1,16 +1,14 @@
-//! Likelihood of a reading for contacts on a force-linear surface.
+//! Likelihood of a reading on a force-linear surface.
 //!
-//! Let d be the reading minus the offsets and f the influences at a position, both over the noise. Channel k
-//! has the independent variance S_k(F) = 1 + r_k·w_k(F), with w_k(F) = ω_k + 2F·β_k + F²·v_k by the posterior
-//! variances ω of the offset and v of the influence and their covariance β. r_k is the independent share, and
-//! g_k = u_k·√w_k the common-mode error ([`super::shared_errors`]). For a force with the
+//! Let d be the reading minus the offsets and f the influences, over the noise. Channel k has the variance
+//! S_k(F) = 1 + r_k·w_k(F), w_k(F) = ω_k + 2F·β_k + F²·v_k (posterior variances ω of the offset and v of the
+//! influence, covariance β), and the common-mode error g_k = u_k·√w_k ([`super::shared_errors`]). For the
 //! [prior](crate::force_prior) p(F),
 //!
 //! p(a | d) ∝ ∫ p(F)·|V|^(−½)·exp(−½·(d − F·f)ᵀ·V⁻¹·(d − F·f)) dF, V = diag(S) + g·gᵀ,
 //!
-//! with V at a point estimate of the force. Position-dependent noise replaces the 1 by m(a). For a nonlinear
-//! response F stands for φ(F), and the estimate is transformed back. The determinant is needed: otherwise
-//! large v between presses would fit every reading. For few presses the overdispersion divides ln p.
+//! with m(a) for the 1 if noise depends on the position, and φ(F) for F. Without the determinant, large v
+//! between presses would fit every reading.
 
 use super::locator::{COVARIANCES, CellScan, ForceLinearLocator, LAYERS, Stored, VALUES, VARIANCES};
 use crate::force_prior::{ForceIntegral, ForceLikelihood};
@@ -27,7 +25,6 @@ use palpate_core::Estimate;
 use palpate_numerics::{SharedError, simd, with_shared_error};
 
 impl ForceLinearLocator {
-    /// Prepares a reading, minus offsets and over the noise, for inversion.
     pub(super) fn seen(&self, relative: &[f64]) -> Seen<'_> {
         Seen {
             locator: self,
@@ -40,7 +37,6 @@ impl ForceLinearLocator {
         }
     }
 
-    /// Sets the critical values of residuals from the recording's own readings.
     pub(super) fn limit_residuals(&mut self, recording: &Recording) {
         let freedom = self.stored.live.len().saturating_sub(self.unknowns());
         let normal = [misfit_bound(freedom), spread_bound(self.stored.prior.extent.dimensions())];
@@ -51,7 +47,6 @@ impl ForceLinearLocator {
         (self.stored.residual_limit, self.stored.spread_limit) = (misfit, Some(spread));
     }
 
-    /// Source of an estimate's force.
     fn told_force(&self) -> ToldForce {
         self.stored.known_force_n.map_or(ToldForce::Estimated, ToldForce::Known)
     }
@@ -62,24 +57,23 @@ impl ForceLinearLocator {
         Inversion::new(self.seen(relative)).estimate(self.told_force(), limits)
     }
 
-    /// Returns the estimate with posterior intervals, also near the ends.
+    /// Estimate with posterior intervals, also near the ends.
     pub(super) fn posterior(&self, reading: &[f64]) -> Estimate {
         self.estimate(&self.relative(reading))
     }
 
-    /// Returns the contact of a reading by summation over the whole grid.
+    /// Contact by summation over the grid.
     #[cfg(test)]
     pub fn summed_everywhere(&self, reading: &[f64], per_node: usize) -> palpate_core::ContactEstimate {
         Inversion::new(self.seen(&self.relative(reading))).summed_everywhere(self.told_force(), per_node)
     }
 }
 
-/// Relative reading with buffers for interpolation.
 #[derive(Debug)]
 pub(super) struct Seen<'a> {
     locator: &'a ForceLinearLocator,
     reading: Vec<Lanes>,
-    /// Noise variance at the current position, over that of an untouched board.
+    /// Noise variance at the position over an untouched board's.
     noise: f64,
     between: Vec<Lanes>,
     slopes: Vec<Slopes>,
@@ -88,20 +82,19 @@ pub(super) struct Seen<'a> {
     shared: Vec<Lanes>,
 }
 
-/// Sums over the channels at a position, with the variances of one force.
 struct WeighChannels<'a, const SHARED: bool> {
     reading: &'a [Lanes],
-    /// f, v and β of the position.
+    /// f, v and β.
     functions: [&'a [Lanes]; LAYERS],
     open: &'a [Lanes],
-    /// r and u, used with common-mode errors.
+    /// r and u.
     own: &'a [Lanes],
     shared: &'a [Lanes],
     noise: f64,
     force_n: f64,
 }
 
-/// dᵀ·V⁻¹·d, fᵀ·V⁻¹·d, fᵀ·V⁻¹·f and ln|V|, with V relative to the noise.
+/// dᵀ·V⁻¹·d, fᵀ·V⁻¹·d, fᵀ·V⁻¹·f and ln|V|, over the noise.
 #[derive(Clone, Copy, Debug)]
 struct Weighed {
     dd: f64,
@@ -192,7 +185,7 @@ impl Seen<'_> {
         }
     }
 
-    /// Writes whitened d and f of the channels for a contact; returns the log determinant up to a constant.
+    /// Writes whitened d and f; returns the log determinant up to a constant.
     pub(super) fn whiten(&mut self, at: Unknowns, channels: &mut Vec<[f64; 2]>) -> f64 {
         self.weigh(at);
         let ForceLinearLocator { layers, stored, .. } = self.locator;
@@ -211,13 +204,12 @@ impl Seen<'_> {
         log_determinant / stored.channels_as_one
     }
 
-    /// Values of the channels in use over their independent standard deviations.
+    /// Values over the independent standard deviations.
     fn over_own(&self, values: impl Iterator<Item = f64>) -> impl Iterator<Item = f64> {
         let weights = self.weights.as_flattened().iter().take(self.locator.stored.live.len());
         weights.zip(values).map(|(weight, value)| weight.sqrt() * value)
     }
 
-    /// Common-mode error over the independent errors.
     fn shared_error(&self) -> SharedError {
         SharedError::new(self.over_own(self.shared.as_flattened().iter().copied()).collect())
     }
@@ -240,7 +232,7 @@ impl Explain for Seen<'_> {
         }
     }
 
-    /// For few presses, variances change too much between nodes.
+    /// For few presses variances change too much between nodes.
     fn bounds_are_loose(&self) -> bool {
         !self.locator.shared.is_empty() || self.locator.stored.channels_as_one > 1.0
     }
@@ -311,7 +303,7 @@ impl Explain for Seen<'_> {
         spread_score(about, reading, reads)
     }
 
-    /// φ follows by steps from `latent`, each with the variances of the last.
+    /// φ by steps from `latent`, each with the last one's variances.
     fn explain(&mut self, place: [f64; 2], latent: f64) -> Explained {
         /// Two steps leave less than a thousandth.
         const STEPS: usize = 2;

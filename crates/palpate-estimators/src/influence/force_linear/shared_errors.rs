@@ -1,19 +1,14 @@
-//! Common-mode errors of influence functions.
+//! Common-mode errors of influence functions, which all channels learn at equal positions.
 //!
-//! Functions learnt at few positions are uncertain at equal positions in all channels, and sensors of one
-//! surface respond alike. The error of channel k is √w_k·(u_k·z + √r_k·e_k), with w_k the posterior variance
-//! of its reading, z standard normal and common to all channels, and e_k independent. The loadings u are
-//! those of the first principal component of the channels' correlation. With A the covariance of the presses,
-//! K its part without noise and P = A⁻¹ minus the projection on offset and polynomials, it is that of
-//! yᵀ·P·K·P·y (Conti and O'Hagan, Journal of Statistical Planning and Inference 140, 2010, for outputs that
-//! share a design).
+//! The error of channel k is √w_k·(u_k·z + √r_k·e_k), with w_k the posterior variance and z (common) and e_k
+//! (independent) standard normal. u are the loadings of the first principal component of yᵀ·P·K·P·y, scaled
+//! to correlations, with A the covariance of the presses, K its part without noise and P = A⁻¹ minus the part
+//! of offset and polynomials (Conti and O'Hagan, Journal of Statistical Planning and Inference 140, 2010).
+//! For N independent channels with ν degrees of freedom, it has a variance of about (1 + √(N/ν))² (Johnstone,
+//! Annals of Statistics 29, 2001): below, errors are independent.
 //!
-//! For N independent channels with ν degrees of freedom, the first component has a variance of about (1 +
-//! √(N/ν))² (Johnstone, Annals of Statistics 29, 2001). Below it no common-mode error is modelled.
-//!
-//! Along a line r_k = 1 − u_k². On a plane r_k = 1: beside its sensor an influence has a peak that the
-//! presses around it miss, in each channel independently. For point sensors along a line, sources and cubics
-//! make up most of every function, and no common-mode error is modelled.
+//! Along a line r_k = 1 − u_k². On a plane r_k = 1, as presses miss the peak beside each sensor
+//! independently. For point sensors along a line, sources and cubics dominate, without common errors.
 
 use super::evidence::{ChannelFit, Evidence};
 use super::presses::Presses;
@@ -22,7 +17,7 @@ use ndarray::Array2;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::{NotPositiveDefinite, median};
 
-/// Returns the loadings u of the channels; empty without common-mode errors.
+/// Loadings u; empty without common-mode errors.
 pub(super) fn loadings(
     presses: &Presses,
     prior: &Prior,
@@ -54,14 +49,13 @@ pub(super) fn loadings(
     Ok(if is_common(&loadings, freedom) { loadings } else { Vec::new() })
 }
 
-/// Returns whether the first component has more variance than that of independent channels.
+/// Returns whether the variance exceeds that of independent channels.
 fn is_common(loadings: &[f64], freedom: usize) -> bool {
     let variance: f64 = loadings.iter().map(|loading| loading * loading).sum();
     variance > (1.0 + (loadings.len() as f64 / freedom as f64).sqrt()).powi(2)
 }
 
-/// Loadings of the first principal component of the correlations, by the power method: channels may be
-/// hundreds.
+/// First principal component by the power method, as channels may be hundreds.
 fn first_component(products: &Array2<f64>) -> Vec<f64> {
     const ROUNDS: usize = 100;
     let n = products.nrows();
@@ -80,7 +74,7 @@ fn first_component(products: &Array2<f64>) -> Vec<f64> {
     component.iter().map(|loading| (loading / value.sqrt()).clamp(-1.0, 1.0)).collect()
 }
 
-/// Returns r for given loadings.
+/// r for given loadings.
 pub(super) fn own_shares(loadings: &[f64], extent: Extent) -> Vec<f64> {
     match extent {
         Extent::Line { .. } => loadings.iter().map(|u| (1.0 - u * u).max(0.0)).collect(),

@@ -1,5 +1,6 @@
-//! Strips with raw gauges, by known physics: a clamped strip under random gauges, gains and offsets, pressed at a few places with recorded
-//! forces and asked with unknown ones; beside it what fifteen lines of SciPy do: offset + force × cubic spline of the position.
+//! Strips and plates with raw gauges, by known physics: random gauges, gains and offsets, a calibration at a
+//! few positions with recorded forces, and contacts of unknown force. The reference is a regression with
+//! SciPy: offset + force × cubic spline of the position.
 
 use super::locator::{Stored, Tables};
 use super::posterior::Functions;
@@ -41,7 +42,7 @@ mod scatter;
 const STRIP_M: f64 = 0.3;
 const PLATE_M: [f64; 2] = [0.2, 0.15];
 const GAUGES: usize = 6;
-/// Contacts are at least this far from the surface's ends.
+/// Least distance of contacts from the surface's ends.
 const MARGIN_M: f64 = 0.02;
 /// Largest influence of a gauge of gain 1, in counts per newton.
 const FULL_SCALE: f64 = 60.0;
@@ -50,7 +51,7 @@ const FORCES_N: std::ops::Range<f64> = 0.5..5.0;
 /// Counts per newton of each gauge as a function of the position.
 type Influences = Box<dyn Fn(Position) -> Vec<f64>>;
 
-/// Raw gauges under a surface, and how it is pressed.
+/// Raw gauges under a surface, and calibration rows.
 struct Bench {
     extent: Extent,
     influences: Influences,
@@ -60,7 +61,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// A strip that is clamped at both ends, over strain gauges.
+    /// Clamped strip over strain gauges.
     fn strip(seed: u64, presses: usize, places: usize) -> Self {
         Self::strip_over(GAUGES, seed, presses, places)
     }
@@ -87,7 +88,7 @@ impl Bench {
         Self::new(Extent::line(STRIP_M).unwrap(), gauge_count, influences, pressed, rng)
     }
 
-    /// A plate on simple edges, over deflection sensors; pressed twice at each of 10 × 8 places.
+    /// Simply supported plate over deflection sensors, pressed twice at each of 10 × 8 positions.
     fn plate(seed: u64) -> Self {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let [length_m, width_m] = PLATE_M;
@@ -137,7 +138,7 @@ impl Bench {
         bench
     }
 
-    /// A contact of some force, with one count of noise on every gauge.
+    /// Contact of random force, with noise of one count on every gauge.
     fn touch(&mut self, position: Position) -> Row {
         let force_n = self.rng.random_range(FORCES_N);
         self.row(position, force_n)
@@ -158,7 +159,7 @@ impl Bench {
             .collect()
     }
 
-    /// Contacts anywhere within the margins.
+    /// Contacts at random positions within the margins.
     fn touches(&mut self, count: usize) -> Vec<Row> {
         let size_m = [self.extent.length_m(), self.extent.width_m().unwrap_or(0.0)];
         (0..count)
@@ -192,7 +193,7 @@ impl Bench {
         config.fit_method(FitTask::new(&setup, &recording)).unwrap()
     }
 
-    /// The same locator with the true offsets, influence functions and noise.
+    /// Locator with the true offsets, influence functions and noise.
     fn with_known_functions(&self, locator: &ForceLinearLocator) -> ForceLinearLocator {
         let mut stored = Stored::from(locator.clone());
         let (x, y) = (stored.x, stored.y);
@@ -220,7 +221,7 @@ impl Bench {
     }
 }
 
-/// Readings per newton of gauges whose gains differ, in counts.
+/// Readings per newton of gauges with different gains, in counts.
 fn raw_influences(
     surface: impl Surface + 'static,
     kind: SensorKind,
@@ -235,8 +236,8 @@ fn raw_influences(
     })
 }
 
-/// What fifteen lines of SciPy do: the basis of a regression of reading = offset + force × Σ coefficient × basis(position), solved by
-/// least squares, and the grid on which readings are located by least squares.
+/// Least-squares regression of reading = offset + force × Σ coefficient × basis(position), and the grid on
+/// which least squares locate readings.
 #[derive(Clone)]
 struct Regression {
     basis: Rc<dyn Fn(Position) -> Vec<f64>>,
@@ -247,14 +248,14 @@ struct Regression {
 /// Model of the offsets in a regression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Drift {
-    /// They stay.
+    /// Constant.
     None,
-    /// They move in proportion to the time, or to the rows before.
+    /// Proportional to time, or to the row number.
     Linear,
 }
 
 impl Regression {
-    /// A cubic spline with a coefficient for every place that was pressed.
+    /// Cubic spline with a coefficient for every calibrated position.
     fn spline(places: usize) -> Self {
         const STEPS: usize = 1300;
         let span_m = STRIP_M - 2.0 * MARGIN_M;
@@ -263,7 +264,7 @@ impl Regression {
         Self { basis: Rc::new(basis), grid: grid.collect(), drift: Drift::None }
     }
 
-    /// Cubic radial basis functions r³ around every place that was pressed, and a plane.
+    /// Cubic radial basis functions r³ around every calibrated position, and a plane.
     fn radial_basis(presses: &[Row]) -> Self {
         const STEPS: [usize; 2] = [160, 110];
         let mut centres: Vec<Position> = presses.iter().map(|row| row.position).collect();
@@ -288,7 +289,7 @@ impl Regression {
     }
 
     fn errors_mm(&self, presses: &[Row], touches: &[Row]) -> Vec<f64> {
-        // Time runs from -1 to 0, so that the constant is the offset at the recording's end.
+        // Time runs from -1 to 0: the constant is the offset at the recording's end.
         let time = |i: usize, row: &Row| match (self.drift, row.time_s, presses[presses.len() - 1].time_s) {
             (Drift::None, ..) => Vec::new(),
             (Drift::Linear, Some(time), Some(end)) => vec![time / end - 1.0],
@@ -329,7 +330,7 @@ impl Regression {
     }
 }
 
-/// The cubic B-splines over even knots from 0 to 1 with fourfold ends (de Boor's recursion).
+/// Cubic B-splines over even knots from 0 to 1 with fourfold ends (de Boor's recursion).
 fn cubic_basis(t: f64, count: usize) -> Vec<f64> {
     let pieces = count - 3;
     let knot = |i: usize| (i.saturating_sub(3).min(pieces)) as f64 / pieces as f64;
@@ -351,7 +352,7 @@ fn cubic_basis(t: f64, count: usize) -> Vec<f64> {
     values
 }
 
-/// Errors of a locator in millimetres, and the share of the 95 % regions that hold the contact.
+/// Errors of a locator in millimetres, and coverage of the 95 % regions.
 fn errors_mm(locator: &impl Locate, touches: &[Row]) -> (Vec<f64>, f64) {
     let (mut errors, mut covered) = (Vec::new(), 0);
     for touch in touches {
@@ -365,19 +366,19 @@ fn errors_mm(locator: &impl Locate, touches: &[Row]) -> (Vec<f64>, f64) {
     (errors, covered as f64 / touches.len() as f64)
 }
 
-/// Errors over many benches, ours beside a regression's.
+/// Errors over many benches, beside those of a regression.
 #[derive(Default)]
 struct Comparison {
-    /// Median and mean error of each bench in millimetres: ours, theirs.
+    /// Median and mean error of each bench in millimetres: locator, regression.
     medians: Vec<[f64; 2]>,
     means: Vec<[f64; 2]>,
     covered: Vec<f64>,
-    /// Mean error of each bench in millimetres where the influence functions are known: the limit.
+    /// Mean error of each bench in millimetres with known influence functions: the limit.
     limits: Vec<f64>,
 }
 
 impl Comparison {
-    /// Adds a bench: its locator beside errors of a regression.
+    /// Adds a bench with the errors of a regression.
     fn add(&mut self, bench: &Bench, locator: &InfluenceLocator, touches: &[Row], theirs: Vec<f64>) {
         if let InfluenceLocator::ForceLinear(linear) = locator {
             let (limits, _) = errors_mm(&bench.with_known_functions(linear), touches);
@@ -389,14 +390,14 @@ impl Comparison {
         self.covered.push(covered);
     }
 
-    /// Share of the benches where ours are no larger; mean of ours, and of theirs.
+    /// Share of benches with errors no larger than the regression's; mean errors of both.
     fn summary(list: &[[f64; 2]]) -> (f64, [f64; 2]) {
         let won = list.iter().filter(|[ours, theirs]| ours <= theirs).count();
         (won as f64 / list.len() as f64, [0, 1].map(|side| mean(list.iter().map(|pair| pair[side]))))
     }
 }
 
-/// Strips that are pressed so often, at so many places: locators of a structure beside the spline.
+/// Locators of a structure on strips, beside the spline.
 fn compare_strips(count: u64, (presses, places): (usize, usize), structure: Structure) -> Comparison {
     let mut comparison = Comparison::default();
     for seed in 0..count {
@@ -408,7 +409,7 @@ fn compare_strips(count: u64, (presses, places): (usize, usize), structure: Stru
     comparison
 }
 
-/// Coverage of contacts, each drawn by the board that it presses, by boards in turn.
+/// Coverage of contacts by boards in turn; each board draws its own contacts.
 fn covered(
     boards: &mut [(Bench, ForceLinearLocator)],
     readings: usize,
@@ -425,14 +426,14 @@ fn covered(
     row
 }
 
-/// A sample of the experiment `raw-strips`.
+/// Sample of the experiment `raw-strips`.
 #[test]
 fn strips_are_located_better_than_by_a_spline() {
     for (presses, places) in [(25, 9), (60, 15)] {
         let comparison = compare_strips(2, (presses, places), Structure::Auto);
         let ((won, _), (won_mean, [ours_mm, theirs_mm])) =
             (Comparison::summary(&comparison.medians), Comparison::summary(&comparison.means));
-        // On 50 strips of the experiment the errors are smaller on each, by half in the mean.
+        // On 50 strips of the experiment all errors are smaller, by half in the mean.
         assert!(won == 1.0 && won_mean == 1.0, "worse than the spline: {won} {won_mean}");
         assert!(ours_mm <= 0.8 * theirs_mm, "{ours_mm} {theirs_mm}");
         let (limit_mm, covered) =
@@ -454,7 +455,8 @@ fn the_structure_of_elastic_surfaces_is_worth_more_than_half_of_the_error() {
     assert!(mean_mm(&linear) < 0.5 * mean_mm(&free), "{} {}", mean_mm(&linear), mean_mm(&free));
 }
 
-/// A sample of the experiment `raw-strips`, whose errors on plates are a seventh below the regression's and at the limit.
+/// Sample of the experiment `raw-strips`: errors on plates are a seventh below the regression's, at the
+/// limit.
 #[test]
 fn plates_are_located_better_than_by_radial_basis_functions() {
     let mut comparison = Comparison::default();
@@ -505,7 +507,7 @@ fn rows_without_force_teach_offset_and_noise() {
     }
 }
 
-/// Readings that follow a power of the force, which may change from one end of the strip to the other.
+/// Replaces readings by a power of the force, which may change along the strip.
 fn bend_response(bench: &mut Bench, powers: [f64; 2]) {
     for row in &mut bench.presses {
         let force_n = row.force_n.unwrap();
@@ -554,7 +556,7 @@ fn presses_that_nothing_explains_are_set_aside() {
         assert_eq!(bench.fit(Structure::Auto).unwrap().set_aside(), [0usize; 0]);
         let touches = bench.touches(100);
         let clean = mean(errors_mm(&bench.fit(Structure::Auto).unwrap(), &touches).0);
-        // One was pressed elsewhere, and a gauge of another was read wrong.
+        // One row has a wrong position, another a misread gauge.
         bench.presses[4].position.x_m += 0.05;
         bench.presses[16].reading[2] += 60.0;
         let locator = bench.fit(Structure::Auto).unwrap();
@@ -614,7 +616,7 @@ fn the_determinant_of_many_gauges_does_not_overflow() {
     let mut bench = Bench::strip_over(48, 7, 60, 15);
     let locator = bench.fit(Structure::ForceLinear).unwrap();
     let mut file = serde_json::to_value(&locator).unwrap();
-    // As of gauges with next to no noise: the product of their variances is beyond the largest number.
+    // Nearly noiseless gauges: the product of their variances overflows.
     file["functions"]["offset_variances"] = serde_json::json!(vec![1e12; 48]);
     let locator: ForceLinearLocator = serde_json::from_value(file).unwrap();
     let touch = bench.touch(Position::along(0.1234));
@@ -630,12 +632,12 @@ fn estimates_are_those_of_a_plain_sum_over_the_grid() {
     let touches = bench.touches(40);
     let mut precise = Bench::strip(10, 60, 15);
     for row in &mut precise.presses {
-        // Next to no noise: a cell is many deviations wide.
+        // Nearly noiseless: a cell is many standard deviations wide.
         let clean = (precise.influences)(row.position);
         let force_n = row.force_n.unwrap();
         row.reading = clean.iter().zip(&precise.offsets).map(|(f, offset)| offset + force_n * f).collect();
     }
-    // Little is known of its influences, and all channels share what is open.
+    // Uncertain influences, with common-mode errors.
     let mut open = ends::six_places(1, 1);
     let open_touches = open.touches(40);
     for (bench, touches) in [(&bench, &touches), (&precise, &precise.presses.clone()), (&open, &open_touches)]
@@ -647,7 +649,7 @@ fn estimates_are_those_of_a_plain_sum_over_the_grid() {
             let sd_m = all.uncertainty.unwrap().covariance[0].sqrt();
             let apart_m = found.contact.position.distance_m(all.position);
             assert!(found.contact.uncertainty.is_some(), "{found:?} {all:?}");
-            // Of several modes the estimate is but one.
+            // The estimate is one of several modes.
             assert!(
                 found.status == Status::Ambiguous || apart_m < 0.1 * sd_m + 5e-5,
                 "{apart_m} m of {sd_m} m: {found:?} {all:?}"
@@ -660,7 +662,7 @@ fn estimates_are_those_of_a_plain_sum_over_the_grid() {
 const GAUGE_FIT: evidence::ChannelFit =
     evidence::ChannelFit { ratio: 1e-4, signal: 1e4, evidence: 0.0, sources: Vec::new() };
 
-/// Functions of the first gauge at places along a strip, as presses tell them under a smooth prior.
+/// Functions of the first gauge along a strip, under a smooth prior.
 fn functions_of(presses: &Presses, prior: &Prior) -> Functions {
     let places_m: Vec<Vec<f64>> = (0..50).map(|i| vec![STRIP_M * f64::from(i) / 49.0]).collect();
     posterior::functions(prior, presses, &[(0, &GAUGE_FIT)], &[], &places_m, Watch::NONE).unwrap().remove(0)
@@ -699,7 +701,7 @@ fn presses_of_the_same_places_are_condensed_without_loss() {
     }
 }
 
-/// Mean errors in millimetres on a plate with presses anywhere, from all of them, and from fewer in their place.
+/// Mean errors in millimetres on a plate with random positions: by all presses, and by condensed ones.
 fn condensed_mm(presses: usize, condensed: usize, touches: usize) -> [f64; 2] {
     let mut bench = Bench::plate(1);
     bench.presses = bench.touches(presses);
@@ -763,7 +765,7 @@ fn presses_that_nothing_explains_are_set_aside_among_many() {
         let touches = bench.touches(200);
         let clean = condensed(&bench);
         assert_eq!(clean.set_aside(), [0usize; 0]);
-        // Some were pressed elsewhere, and a gauge of others was read wrong.
+        // Some rows have wrong positions, others a misread gauge.
         let moved = [17, 170, 333];
         let misread = [40, 41, 42, 200, 420];
         for row in moved {

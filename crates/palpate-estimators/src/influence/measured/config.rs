@@ -1,4 +1,4 @@
-//! Settings, scales and errors of learning a measured surface.
+//! Settings and errors of the measured-surface method.
 
 use crate::fit::ChannelMismatch;
 use crate::recording::TooFewPositions;
@@ -6,18 +6,18 @@ use palpate_numerics::NotPositiveDefinite;
 use palpate_numerics::regression::{Kernel, RegressionError, Trend};
 use palpate_numerics::watch::Cancelled;
 
-/// Settings of the regression of readings on position and nuisance coordinate.
+/// Settings of the regression of readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeasuredInfluence {
-    /// Scale of the readings; `None` for logarithms where every reading is positive.
+    /// Scale of the readings; `None` for logarithms if all are positive.
     pub readings: Option<Scale>,
-    /// Scale of the nuisance coordinate; `None` for logarithms where every value is positive.
+    /// Scale of the nuisance coordinate; `None` for logarithms if all are positive.
     pub nuisance: Option<Scale>,
-    /// Kernel of the Gaussian process.
+    /// Kernel of the process.
     pub kernel: Kernel,
-    /// Trend: mean of the readings far from every press.
+    /// Mean far from every press.
     pub trend: Trend,
-    /// Most distinct presses in the hyperparameter search, drawn at random; at least 2.
+    /// Most distinct presses of the hyperparameter search, drawn at random; at least 2.
     pub search_points: usize,
 }
 
@@ -57,7 +57,7 @@ pub enum MeasuredError {
         /// Row, from 1.
         row: usize,
     },
-    /// Too few presses for influence functions and noise.
+    /// Too few presses to learn from.
     #[error(
         "{presses} presses do not determine influence functions and a force: press at least 3 times, at two positions or more"
     )]
@@ -68,13 +68,13 @@ pub enum MeasuredError {
     /// An error of the regression.
     #[error(transparent)]
     Regression(#[from] RegressionError),
-    /// The noise covariance is not positive definite.
+    /// Noise covariance that is not positive definite.
     #[error("the noise covariance of the channels cannot be factored: {0}")]
     Noise(#[from] NotPositiveDefinite),
-    /// The channels of recording and setup differ.
+    /// Channels that differ from the setup's.
     #[error(transparent)]
     Channels(#[from] ChannelMismatch),
-    /// The fit was cancelled.
+    /// Cancelled fit.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
@@ -85,17 +85,17 @@ pub enum MeasuredError {
 pub enum Scale {
     /// Unchanged.
     Linear,
-    /// Natural logarithm: effects multiply, and errors are relative.
+    /// Natural logarithm, with relative errors.
     Logarithm,
 }
 
 impl Scale {
-    /// Returns logarithms for values that are all positive.
+    /// Logarithms for positive values.
     pub fn for_values(mut values: impl Iterator<Item = f64>) -> Self {
         if values.all(|value| value > 0.0) { Self::Logarithm } else { Self::Linear }
     }
 
-    /// Scales a value; `None` for the logarithm of a value that is not positive.
+    /// Scaled value; `None` without a logarithm.
     pub fn scaled(self, value: f64) -> Option<f64> {
         match self {
             Self::Linear => Some(value),

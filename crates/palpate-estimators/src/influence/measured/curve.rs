@@ -1,8 +1,7 @@
-//! Readings at one position as a cubic in the nuisance coordinate, through the four nearest nodes.
+//! Readings at one position as a cubic in the nuisance coordinate, through four nodes.
 //!
-//! The squared residual along the curve is a polynomial of degree six, P(τ) = |z − μ(τ)|²/V, by ten products
-//! over the channels. Where the minimum τ₀ is far from the ends, five-point Gauss–Hermite quadrature about
-//! the normal density of mean τ₀ and precision P″/2 gives ∫ exp(−P/2) dτ.
+//! P(τ) = |z − μ(τ)|²/V is a polynomial of degree six. Where the minimum τ₀ is far from the ends, five-point
+//! Gauss–Hermite quadrature with mean τ₀ and precision P″/2 gives ∫ exp(−P/2) dτ.
 
 use super::line::Marginal;
 use crate::influence::inversion::{FIVE_POINTS, Stencil};
@@ -10,7 +9,6 @@ use crate::influence::lanes::{Lanes, sum_of};
 use palpate_numerics::simd::{Arithmetic, InstructionSet, Kernel, Simd, Vector};
 use std::f64::consts::PI;
 
-/// Nodes of a cubic, from node `first` of the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Window {
     pub first: usize,
@@ -18,30 +16,28 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// Window around a coordinate of a line of `nodes` nodes.
     pub fn around(node: f64, nodes: usize) -> Self {
         let Stencil { first, used, .. } = Stencil::new(node, nodes);
         Self { first, nodes: used }
     }
 }
 
-/// Standard deviations from an end of the curve where the density is negligible: e⁻¹⁰.
+/// Standard deviations to negligible density, e⁻¹⁰.
 const CLEAR: f64 = 4.5;
-/// Most Newton steps; below, the length of the last one in standard deviations.
+/// Newton steps; below, the last one's length in standard deviations.
 const MOST_STEPS: usize = 12;
 const SMALL_STEP: f64 = 1e-3;
 
-/// Squared residual along a curve, over the variances.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Curve {
     window: Window,
-    /// Coefficients of P, from the constant up, in nodes from `origin`.
+    /// Coefficients of P about `origin`, from the constant up.
     powers: [f64; 7],
     origin: f64,
 }
 
 impl Curve {
-    /// Builds the curve through the whitened means of a window, node by node; `weights` are 1/V.
+    /// `means` are whitened, node by node; `weights` are 1/V.
     pub fn new(reading: &[Lanes], means: &[Lanes], weights: impl Fn(usize) -> Lanes, window: Window) -> Self {
         let (middle, coefficients) = coefficients(window.nodes);
         let products = InstructionSet::best().run(Products {
@@ -68,7 +64,7 @@ impl Curve {
         [0.5 * slope, 0.5 * bend]
     }
 
-    /// Minimum near a node, within the ends, and the precision there; `None` where P is not convex.
+    /// Minimum within the ends, and precision; `None` where P is not convex.
     fn minimum(&self, near: f64, ends: [f64; 2]) -> Option<(f64, f64)> {
         let mut tau = (near - self.origin).clamp(ends[0], ends[1]);
         for _ in 0..MOST_STEPS {
@@ -86,10 +82,10 @@ impl Curve {
         None
     }
 
-    /// Returns the least squared residual near a node, and the integral relative to it.
+    /// Least squared residual, and the integral relative to it.
     ///
     /// # Errors
-    /// Near the curve's ends: the node for the next window, if known.
+    /// Near an end: the node of the next window, if known.
     pub fn integral(&self, near: f64) -> Result<(f64, Marginal), Option<f64>> {
         let start = self.window.first as f64 - self.origin;
         let end = start + (self.window.nodes - 1) as f64;
@@ -117,8 +113,7 @@ impl Curve {
     }
 }
 
-/// Reference node of a polynomial through `nodes` nodes, and the weights of each node in the coefficients of
-/// τ, τ² and τ³.
+/// Reference node, and weights of the nodes in the coefficients of τ, τ² and τ³.
 fn coefficients(nodes: usize) -> (usize, [[f64; 4]; 3]) {
     match nodes {
         1 => (0, [[0.0; 4]; 3]),
@@ -131,7 +126,6 @@ fn coefficients(nodes: usize) -> (usize, [[f64; 4]; 3]) {
     }
 }
 
-/// Products over the channels of the residual at the origin and the coefficients of τ, τ² and τ³.
 struct Products<'a, W> {
     reading: &'a [Lanes],
     means: &'a [Lanes],
@@ -185,7 +179,6 @@ mod tests {
         1.0 / (1.0 + 0.3 * channel as f64)
     }
 
-    /// Squared residual of cubic interpolation, channel by channel.
     fn residual(reading: &[f64], node: f64, window: Window) -> f64 {
         let t = node - window.first as f64;
         let lagrange = |k: usize| -> f64 {
@@ -198,7 +191,6 @@ mod tests {
         (0..CHANNELS).map(channel).sum()
     }
 
-    /// Integral near a coordinate of a line of `nodes` nodes.
     fn found(reading: &[f64], near: f64, nodes: usize) -> (Window, Result<(f64, Marginal), Option<f64>>) {
         let window = Window::around(near, nodes);
         let means: Vec<Lanes> = (0..window.nodes)

@@ -1,4 +1,4 @@
-//! Fit of a measured surface: presses, regression, noise, overdispersion at held-out positions, table.
+//! Fit of a measured surface.
 
 use super::config::{MeasuredError, MeasuredInfluence, Scale};
 use super::locator::{MeasuredLocator, NuisanceRole, Stored};
@@ -20,17 +20,15 @@ use palpate_numerics::watch::{Cancelled, Watch};
 use std::cmp::Ordering;
 
 const LEAST_POSITIONS: usize = 2;
-/// Most nodes along a line, along either axis of a plane, and along the nuisance coordinate.
 const MOST_ALONG: usize = 400;
 const MOST_OF_PLANE: usize = 80;
 const MOST_OF_NUISANCE: usize = 64;
 const MOST_OF_NUISANCE_OF_PLANE: usize = 16;
-/// Tolerated interpolation error of a table, over the noise.
+/// Tolerated interpolation error over the noise.
 const MOST_MISSED: f64 = 0.2;
 /// Least noise variance over the signal's.
 const LEAST_NOISE: f64 = 1e-10;
 
-/// Returns the largest number of position nodes of a table.
 pub(crate) const fn most_nodes(extent: Extent) -> usize {
     match extent {
         Extent::Line { .. } => MOST_ALONG,
@@ -38,7 +36,6 @@ pub(crate) const fn most_nodes(extent: Extent) -> usize {
     }
 }
 
-/// Returns the largest number of nuisance nodes of a table.
 pub(crate) const fn most_nuisance_nodes(extent: Extent) -> usize {
     match extent {
         Extent::Line { .. } => MOST_OF_NUISANCE,
@@ -90,7 +87,6 @@ impl Fit for MeasuredInfluence {
 }
 
 impl Presses {
-    /// Whitening by the noise of readings and the signal of the process.
     fn whitening(
         &self,
         regression: &Regression,
@@ -113,10 +109,9 @@ impl Presses {
         Ok(Whitening::from_covariances(noise, &(signal * square))?)
     }
 
-    /// Covariance of readings by unknown nuisance coordinates beyond the first: Σ s²·J·Jᵀ to first order,
-    /// averaged over presses, with s² the variance and J the derivatives.
+    /// Covariance by unknown further nuisance coordinates, to first order: the mean of Σ s²·J·Jᵀ, with
+    /// variances s² and derivatives J.
     fn covariance_of_further(&self, process: &GaussianProcess) -> Array2<f64> {
-        /// Most presses of the average.
         const TRIED: usize = 1000;
         let (channels, d) = (process.outputs(), process.coordinates());
         let (mut means, mut gradients) = (vec![0.0; channels], vec![0.0; channels * d]);
@@ -136,7 +131,7 @@ impl Presses {
         sum / count
     }
 
-    /// Noise by repeats, or by the process with too few repeats.
+    /// Noise by repeats, or by the process with too few.
     fn noise(&self, process: &GaussianProcess, role: NuisanceRole) -> Result<Noise, MeasuredError> {
         let channels = self.means.ncols();
         let with_gain = role == NuisanceRole::None && self.readings == Scale::Linear;
@@ -158,7 +153,6 @@ impl Presses {
         Ok(repeats.unwrap_or_else(fitted))
     }
 
-    /// Tabulates the process at every node.
     fn table(
         &self,
         axes: [Axis; 3],
@@ -185,8 +179,7 @@ impl Presses {
         Ok(Table { x, y, nuisance, means, variances })
     }
 
-    /// Coordinates of the process at (x, y, nuisance), in nodes, with further nuisance coordinates at their
-    /// means.
+    /// Coordinates at node `at`, with further nuisance coordinates at their means.
     fn coordinates_at(&self, [x, y, nuisance]: [Axis; 3], at: [f64; 3]) -> Vec<f64> {
         let mut coordinates = vec![x.value(at[0])];
         coordinates.extend((self.dimensions() == 2).then(|| y.value(at[1])));
@@ -195,9 +188,8 @@ impl Presses {
         coordinates
     }
 
-    /// Interpolation error of a table over the noise: between positions, and between nuisance nodes.
+    /// Interpolation error over the noise: between positions, and between nuisance nodes.
     fn missed(&self, table: &Table, process: &GaussianProcess, whitening: &Whitening) -> [f64; 2] {
-        /// Most nodes of the check.
         const TRIED: usize = 300;
         let Table { x, y, nuisance, .. } = table;
         let channels = whitening.channels();
@@ -229,8 +221,7 @@ impl Presses {
         squares.map(|square| (square / count).sqrt())
     }
 
-    /// Refines axes by the interpolation error, of fourth order in the distance between nodes, up to the
-    /// largest counts.
+    /// Refines axes by the fourth-order error of cubic interpolation.
     fn finer(&self, [x, y, nuisance]: [Axis; 3], missed: [f64; 2]) -> [Axis; 3] {
         let is_plane = y.count > 1;
         let (most, most_nuisance) = if is_plane {
@@ -258,7 +249,6 @@ impl Presses {
     }
 }
 
-/// Critical value of the squared residual.
 fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
     let table = locator.table();
     let fitted = [table.x, table.y, table.nuisance].iter().filter(|axis| axis.count > 1).count();
@@ -267,20 +257,17 @@ fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
     limit
 }
 
-/// Positions from which every fifth is held out at once; with fewer, each inner position in turn.
+/// Positions from which every fifth is held out; with fewer, each inner one in turn.
 const MANY_TO_JUDGE: usize = 15;
-/// Least positions for hold-out.
 const LEAST_TO_JUDGE: usize = 5;
-/// Range of the factor: with fewer rows to learn from, a factor below 1 is unreliable.
+/// With fewer rows, a factor below 1 is unreliable.
 const FACTORS: (f64, f64) = (1.0, 5.0);
 
-/// Returns the overdispersion of position errors at held-out positions, as a standard-deviation factor;
-/// `None` with too few positions.
+/// Overdispersion of held-out position errors, as a standard-deviation factor; `None` with too few positions.
 ///
-/// It covers departures from the smooth process, such as repeated texture or misplaced presses. For a
-/// residual r with covariance V, and J the derivatives of the mean by position and nuisance coordinate, the
-/// error is δ = (Jᵀ·V⁻¹·J)⁻¹·Jᵀ·V⁻¹·r with covariance (Jᵀ·V⁻¹·J)⁻¹. The factor is the root mean square of the
-/// standardized position errors.
+/// For a residual r of covariance V and derivatives J by the coordinates, the error is δ =
+/// (Jᵀ·V⁻¹·J)⁻¹·Jᵀ·V⁻¹·r with covariance (Jᵀ·V⁻¹·J)⁻¹. The factor is the root mean square of standardized
+/// position errors.
 pub(super) fn misfit(
     presses: &Presses,
     regression: &Regression,
@@ -316,7 +303,6 @@ pub(super) fn misfit(
     Ok(factor.is_finite().then(|| factor.clamp(FACTORS.0, FACTORS.1)))
 }
 
-/// Flags of held-out presses, one list per fold.
 fn held_out(presses: &Presses, dimensions: usize) -> Vec<Vec<bool>> {
     let places: Vec<Vec<f64>> =
         presses.coordinates.outer_iter().map(|at| at.slice(s![..dimensions]).to_vec()).collect();
@@ -336,18 +322,17 @@ fn held_out(presses: &Presses, dimensions: usize) -> Vec<Vec<bool>> {
     }
 }
 
-/// Whitened prediction of the process at a position.
 #[derive(Clone, Debug)]
 struct Prediction {
     mean: Vec<f64>,
-    /// J, one column per coordinate: at most x, y and the nuisance coordinate.
+    /// J by coordinates.
     slopes: Vec<Vec<f64>>,
     /// v.
     variance: f64,
 }
 
 impl Prediction {
-    /// Computes slopes by the first `searched` coordinates; the others are known.
+    /// Slopes are by the first `searched` coordinates; the others are known.
     fn new(process: &GaussianProcess, at: &[f64], searched: usize, whitening: &Whitening) -> Self {
         let (channels, d) = (process.outputs(), process.coordinates());
         let (raw, variances) = process.predict(at);
@@ -364,7 +349,7 @@ impl Prediction {
         Self { mean: white(&raw), slopes: (0..searched).map(slope).collect(), variance }
     }
 
-    /// Squared standardized position error of a reading; `None` where the position is unidentifiable.
+    /// Squared standardized error; `None` where the position is unidentifiable.
     fn score(&self, output: &[f64], whitening: &Whitening, dimensions: usize) -> Option<f64> {
         let mut residual = vec![0.0; output.len()];
         whitening.apply(output, &mut residual);

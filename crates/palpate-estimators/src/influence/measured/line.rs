@@ -1,7 +1,5 @@
-//! Integration over the nuisance coordinate at one position, in straight segments.
-//!
-//! The integrand on a segment is a normal density along a straight line through the space of readings: a
-//! density across it times a probability along it.
+//! Integration over the nuisance coordinate in straight segments: a normal density across times a probability
+//! along.
 
 use crate::influence::lanes::{Lanes, in_lanes, sum_of};
 use crate::influence::noise::Whitening;
@@ -9,21 +7,19 @@ use palpate_numerics::normal_between;
 use palpate_numerics::simd::{Arithmetic, InstructionSet, Kernel, Simd, Vector};
 use std::f64::consts::PI;
 
-/// Nodes of one position along the nuisance coordinate.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line<'a> {
-    /// Whitened means, eight channels side by side, node by node.
+    /// Whitened, node by node.
     pub means: &'a [Lanes],
-    /// v at each node.
+    /// v.
     pub variances: &'a [f64],
 }
 
-/// Noise of whitened channels, eight side by side.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct WhiteNoise {
-    /// d: signal variance over noise variance.
+    /// d: signal over noise variance.
     pub signal: Vec<Lanes>,
-    /// γ: standard deviation of a common gain error.
+    /// γ: standard deviation of a common gain.
     pub gain: f64,
 }
 
@@ -32,28 +28,26 @@ impl WhiteNoise {
         Self { signal: in_lanes(&whitening.signal), gain: whitening.gain }
     }
 
-    /// 1/V of a group of channels, with v the process variance over the signal's.
+    /// 1/V of a group.
     pub fn weights(&self, v: f64, group: usize) -> Lanes {
         self.signal[group].map(|signal| 1.0 / (1.0 + v * signal))
     }
 
-    /// Removes the gain error.
     pub fn without_gain(&self) -> Self {
         Self { signal: self.signal.clone(), gain: 0.0 }
     }
 }
 
-/// Likelihood of a position integrated over the nuisance coordinate.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Marginal {
     /// ∫ exp(−(residual − reference)/2), over the nuisance coordinate in nodes.
     pub weight: f64,
-    /// Mean and variance of the nuisance coordinate, in nodes.
+    /// Mean and variance, in nodes.
     pub mean: f64,
     pub variance: f64,
 }
 
-/// Segment between two nodes: |a − s·d|² for s from 0 to 1, with a = z − μ₀ and d = μ₁ − μ₀ over the standard
+/// Segment between nodes: |a − s·d|² for s from 0 to 1, with a = z − μ₀ and d = μ₁ − μ₀ over the standard
 /// deviations.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stretch {
@@ -64,7 +58,7 @@ pub(super) struct Stretch {
 }
 
 impl Line<'_> {
-    /// Returns the least squared residual of a whitened reading, and the integral relative to its likelihood.
+    /// Least squared residual, and the integral relative to it.
     pub fn explain(
         self,
         reading: &[Lanes],
@@ -84,7 +78,7 @@ impl Line<'_> {
         (least, Marginal { weight, mean, variance: (second / weight - mean * mean).max(0.0) })
     }
 
-    /// Returns the least squared residual, and writes the line's segments to `stretches`.
+    /// Least squared residual; writes the segments to `stretches`.
     pub fn residual(self, reading: &[Lanes], noise: &WhiteNoise, stretches: &mut Vec<Stretch>) -> f64 {
         InstructionSet::best().run(FindStretches {
             line: self,
@@ -99,7 +93,7 @@ impl Line<'_> {
     }
 }
 
-/// Computes the segments between consecutive nodes; one of zero length for a single node.
+/// Segments between nodes; one of zero length for a single node.
 struct FindStretches<'a> {
     line: Line<'a>,
     reading: &'a [Lanes],
@@ -138,7 +132,6 @@ impl Kernel for FindStretches<'_> {
     }
 }
 
-/// Contribution of a segment to the integral.
 #[derive(Clone, Copy, Debug)]
 struct Share {
     weight: f64,
@@ -147,14 +140,13 @@ struct Share {
     spread: f64,
 }
 
-/// Excess squared residual beyond which a segment is negligible.
+/// Negligible excess of the squared residual.
 const NEGLIGIBLE: f64 = 60.0;
-/// Length below which the likelihood is constant along a segment.
 const SHORT: f64 = 1e-4;
 
 impl Stretch {
-    /// Adds a gain error of standard deviation γ to the covariance: |a|² becomes |a|² − γ²·(μᵀ·V⁻¹·a)²/(1 +
-    /// γ²·μᵀ·V⁻¹·μ) (Sherman and Morrison). Valid for zero length only.
+    /// Adds a common gain error, for zero length: |a|² becomes |a|² − γ²·(μᵀ·V⁻¹·a)²/(1 + γ²·μᵀ·V⁻¹·μ)
+    /// (Sherman and Morrison).
     fn explain_by_gain(&mut self, reading: &[Lanes], line: Line, noise: &WhiteNoise) {
         let (mut mm, mut ma) = (0.0, 0.0);
         let channels = reading.as_flattened().iter().zip(line.means.as_flattened());
@@ -172,7 +164,6 @@ impl Stretch {
         if self.dd > 0.0 { (self.ad / self.dd).clamp(0.0, 1.0) } else { 0.0 }
     }
 
-    /// Squared residual at s.
     pub fn residual_at(self, s: f64) -> f64 {
         (self.aa - 2.0 * s * self.ad + s * s * self.dd).max(0.0)
     }

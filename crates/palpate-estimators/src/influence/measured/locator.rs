@@ -1,4 +1,4 @@
-//! Locator of a measured surface: inversion of its table over position and nuisance coordinate.
+//! Locator of a measured surface.
 
 use super::config::Scale;
 use super::curve::{Curve, Window};
@@ -22,15 +22,14 @@ use palpate_numerics::simd::{Arithmetic, InstructionSet, Kernel, Simd, Vector};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NuisanceRole {
-    /// Absent: readings depend on the position alone.
+    /// Absent.
     None,
-    /// Contact force in newtons, part of the estimate.
+    /// Contact force, in newtons.
     Force,
     /// Another quantity.
     Other,
 }
 
-/// Serialized part of a locator.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Stored {
@@ -39,13 +38,12 @@ pub(super) struct Stored {
     pub table: Table,
     pub role: NuisanceRole,
     pub nuisance: Scale,
-    /// Squared residual, in variances, at which a reading is `outside_model`.
+    /// Squared residual, in variances, from which a reading is `outside_model`.
     pub residual_limit: f64,
-    /// Known contact force, in newtons.
     pub force_n: Option<f64>,
 }
 
-/// Locator by learnt readings as a function of position and nuisance coordinate.
+/// Locator by learnt readings.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct MeasuredLocator {
@@ -53,28 +51,26 @@ pub struct MeasuredLocator {
     search: Search,
 }
 
-/// Table prepared for the search.
 #[derive(Clone, Debug, PartialEq)]
 struct Search {
     /// Means, one layer per nuisance node.
     means: Layers,
-    /// v, with nuisance nodes in place of channels.
+    /// v, with nuisance nodes as channels.
     variances: Layers,
     noise: WhiteNoise,
     cells: Cells,
     scan: Scan,
-    /// Greatest distance of the reading from those of neighbours along and across, over the standard
-    /// deviations, per nuisance node.
+    /// Greatest distances from neighbours' readings over the standard deviations, per nuisance node.
     lengths: Vec<[f64; 2]>,
 }
 
-/// Nodes of a cell along either axis with a nuisance coordinate; otherwise 1.
+/// Nodes of a cell along an axis, with a nuisance coordinate.
 const STRIDE: usize = 3;
-/// Straight segments between two nodes.
+/// Straight segments between nodes.
 const PARTS: usize = 4;
-/// Most windows on a line, each around the coordinate from the last.
+/// Windows around successive minima.
 const MOST_WINDOWS: usize = 3;
-/// Bound of the gain, in standard deviations.
+/// In standard deviations.
 const MOST_GAIN: f64 = 6.0;
 
 impl Search {
@@ -106,7 +102,6 @@ impl Search {
         }
     }
 
-    /// Computes the distances from each node of a position to the lines of its neighbours.
     fn find_lengths(&mut self, axes: [Axis; 2], nodes: usize) {
         let noise = self.noise.without_gain();
         let mut stretches = Vec::new();
@@ -123,43 +118,42 @@ impl Search {
 }
 
 impl MeasuredLocator {
-    /// Returns the learnt readings.
+    /// Learnt readings.
     pub fn table(&self) -> &Table {
         &self.stored.table
     }
 
-    /// Returns the whitening of scaled readings to unit noise.
+    /// Whitening of scaled readings to unit noise.
     pub fn whitening(&self) -> &Whitening {
         &self.stored.whitening
     }
 
-    /// Returns the scale of the readings.
+    /// Scale of the readings.
     pub fn readings(&self) -> Scale {
         self.stored.readings
     }
 
-    /// Returns the role of the nuisance coordinate.
+    /// Role of the nuisance coordinate.
     pub fn role(&self) -> NuisanceRole {
         self.stored.role
     }
 
-    /// Returns the scale of the nuisance coordinate.
+    /// Scale of the nuisance coordinate.
     pub fn nuisance(&self) -> Scale {
         self.stored.nuisance
     }
 
-    /// Sets the critical value of the squared residual.
     pub(super) fn with_residual_limit(mut self, limit: f64) -> Self {
         self.stored.residual_limit = limit;
         self
     }
 
-    /// Returns the least squared residual of a reading, over the variances; NaN for a reading off its scale.
+    /// Least squared residual over the variances; NaN off the scale.
     pub(super) fn misfit(&self, reading: &[f64]) -> f64 {
         self.seen(reading).map_or(f64::NAN, |seen| Inversion::new(seen).misfit())
     }
 
-    /// Returns the contact of a reading by summation over the whole grid.
+    /// Contact by summation over the grid.
     #[cfg(test)]
     pub(super) fn summed_everywhere(
         &self,
@@ -170,12 +164,11 @@ impl MeasuredLocator {
             .summed_everywhere(self.told_force(), per_node)
     }
 
-    /// Returns whether estimates have a force: a known one, or the nuisance coordinate.
+    /// Returns whether estimates have a force.
     pub fn tells_force(&self) -> bool {
         self.told_force() != ToldForce::Untold
     }
 
-    /// Source of an estimate's force.
     fn told_force(&self) -> ToldForce {
         match (self.stored.role, self.stored.force_n) {
             (NuisanceRole::Force, _) => ToldForce::Estimated,
@@ -184,7 +177,7 @@ impl MeasuredLocator {
         }
     }
 
-    /// Scales and whitens a reading; `None` off the scale.
+    /// Whitened reading; `None` off its scale.
     fn seen(&self, reading: &[f64]) -> Option<Seen<'_>> {
         let Stored { readings, whitening, .. } = &self.stored;
         let scaled = reading.iter().map(|value| readings.scaled(*value)).collect::<Option<Vec<f64>>>()?;
@@ -228,7 +221,6 @@ impl Stored {
         MeasuredLocator { search: Search::new(&self.table, &self.whitening), stored: self }
     }
 
-    /// Validates the content of a file.
     fn check(&self) -> Result<(), LocatorFault> {
         let Self { table, whitening, .. } = self;
         let numbers = |what, list: &[f64], good: fn(f64) -> bool, bound| {
@@ -265,7 +257,6 @@ impl From<MeasuredLocator> for Stored {
     }
 }
 
-/// Whitened reading with buffers for interpolation.
 #[derive(Debug)]
 struct Seen<'a> {
     locator: &'a MeasuredLocator,
@@ -280,8 +271,7 @@ struct Seen<'a> {
 }
 
 impl Seen<'_> {
-    /// Least squared residual of a position and integral over its line near a node; `None` where the ends or
-    /// another part may matter.
+    /// Least squared residual and integral near a node; `None` where other parts of the line matter.
     fn explain_near(&mut self, place: [f64; 2], mut near: f64) -> Option<(f64, Marginal)> {
         let nodes = self.nodes();
         for _ in 0..MOST_WINDOWS {
@@ -298,7 +288,7 @@ impl Seen<'_> {
         None
     }
 
-    /// [`Self::explain_near`] over the whole line, in straight segments.
+    /// [`Self::explain_near`] over the whole line.
     fn explain_line(&mut self, place: [f64; 2]) -> (f64, Marginal) {
         let nodes = self.nodes();
         let Search { means, noise, .. } = &self.locator.search;
@@ -328,13 +318,11 @@ impl Seen<'_> {
         (misfit, Marginal { weight: weight * scale, mean: mean * scale, variance: variance * scale * scale })
     }
 
-    /// Interpolates the variances along the line of a position.
     fn interpolate_variances(&mut self, place: [f64; 2]) {
         self.locator.search.variances.interpolate(place, 0..1, &mut self.variances);
         self.variances.as_flattened_mut().iter_mut().for_each(|v| *v = v.max(0.0));
     }
 
-    /// Variance at a node of the line that was interpolated last.
     fn variance(&self, node: f64) -> f64 {
         let variances = self.variances.as_flattened();
         let (first, share) = self.stretch(node);
@@ -342,13 +330,13 @@ impl Seen<'_> {
         variances[first] + share * (variances[next] - variances[first])
     }
 
-    /// Segment of a nuisance coordinate, and the fraction within it.
+    /// Segment, and the fraction within it.
     fn stretch(&self, node: f64) -> (usize, f64) {
         let first = (node.max(0.0) as usize).min(self.nodes().saturating_sub(2));
         (first, node - first as f64)
     }
 
-    /// Equations with the nuisance coordinate as the latent variable.
+    /// Equations with the nuisance coordinate as latent variable.
     fn equations_of_line(&mut self, [x, y, latent]: Unknowns) -> Equations {
         let Search { means, .. } = &self.locator.search;
         let stencil = Stencil::new(latent, self.nodes());
@@ -361,7 +349,7 @@ impl Seen<'_> {
         })
     }
 
-    /// Equations with a gain, in standard deviations, as the latent variable.
+    /// Equations with a gain, in standard deviations, as latent variable.
     fn equations_of_gain(&mut self, [x, y, latent]: Unknowns) -> Equations {
         let Search { means, noise, .. } = &self.locator.search;
         means.interpolate_slopes([x, y], 0..1, &mut self.slopes);
@@ -380,12 +368,10 @@ impl Seen<'_> {
     }
 }
 
-/// Sums the equations of a reading between nuisance nodes.
 struct LineEquations<'a> {
     reading: &'a [Lanes],
     /// 1/V.
     weights: &'a [Lanes],
-    /// Means and slopes at the nodes of the stencil, node by node.
     slopes: &'a [Slopes],
     stencil: Stencil,
 }
@@ -448,7 +434,7 @@ impl Explain for Seen<'_> {
         [0, 1].map(|k| below[k].max(above[k]))
     }
 
-    /// Range of the nuisance coordinate in nodes, or of a gain in standard deviations.
+    /// Nuisance coordinate in nodes, or gain in standard deviations.
     fn range(&self) -> Option<(f64, f64)> {
         let nodes = self.nodes();
         let gain = self.locator.search.noise.gain > 0.0;
@@ -467,7 +453,7 @@ impl Explain for Seen<'_> {
         if self.nodes() > 1 { self.equations_of_line(at) } else { self.equations_of_gain(at) }
     }
 
-    /// Zero, as readings may be logarithms, which do not add.
+    /// Zero, as logarithms do not add.
     fn spread(&mut self, _: Unknowns) -> f64 {
         0.0
     }
@@ -486,7 +472,6 @@ impl Explain for Seen<'_> {
         }
     }
 
-    /// Force by the nuisance coordinate.
     fn force(&self, latent: f64, variance: f64) -> (f64, f64) {
         let Stored { table, nuisance, role, .. } = &self.locator.stored;
         if *role != NuisanceRole::Force {

@@ -1,18 +1,14 @@
 //! Measured surface: readings learnt as a function of position and nuisance coordinate.
 //!
-//! The forward model is reading = f(position, nuisance) + noise, with f a Gaussian process. The nuisance
-//! coordinate is recorded in the calibration and unknown in use, such as force or indentation depth. The
-//! prior is uniform over the calibrated range and half a gap beyond; positions up to a whole gap beyond have
-//! less weight. The posterior is
+//! reading = f(position, nuisance) + noise, with f a Gaussian process and *nuisance* a coordinate unknown in
+//! use, such as force. The prior is uniform within the calibration and half a gap beyond, and smaller up to a
+//! gap:
 //!
 //! p(position | reading) ∝ ∫ N(reading; f̄, C + v·S) d nuisance,
 //!
-//! with f̄ and v the process's mean and relative variance, S the signal covariance, C the noise covariance,
-//! and N the normal density without its determinant. v is least at the presses: the determinant would draw
-//! every estimate towards them. The estimate is the posterior mean.
-//!
-//! C follows from repeats, or from the process without repeats, scaled by the overdispersion at held-out
-//! positions.
+//! with the mean f̄, relative variance v and signal covariance S of the process. The noise covariance C is
+//! that of repeats or of the process, scaled by held-out errors. N has no determinant, which would draw
+//! estimates to the presses, where v is least. The estimate is the posterior mean.
 
 mod config;
 mod curve;

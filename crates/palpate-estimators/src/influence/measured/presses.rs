@@ -1,4 +1,4 @@
-//! Presses of the regression: repeats averaged, readings and nuisance coordinate on their scales.
+//! Presses of the regression, with repeats averaged.
 
 use super::config::{MeasuredError, MeasuredInfluence, Scale};
 use super::locator::NuisanceRole;
@@ -8,8 +8,7 @@ use ndarray::Array2;
 use palpate_numerics::mean;
 use std::collections::HashMap;
 
-/// Returns the nuisance coordinates row by row: the named columns, or a recorded force that the setup does
-/// not fix.
+/// Nuisance coordinates row by row: named columns, or a recorded force that the setup does not fix.
 pub(super) fn nuisance_coordinates(
     setup: &Setup,
     recording: &Recording,
@@ -38,16 +37,14 @@ pub(super) fn nuisance_coordinates(
 /// Nuisance coordinate beyond the first, not estimated in use.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Further {
-    /// Index among a row's nuisance coordinates.
     index: usize,
-    /// Mean of the recorded values.
     pub mean: f64,
-    /// Variance of the recorded values, greater than 0.
+    /// Greater than 0.
     pub variance: f64,
 }
 
 impl Further {
-    /// Returns the nuisance coordinates beyond the first that vary.
+    /// Nuisance coordinates beyond the first that vary.
     fn of_rows(nuisances: &[Vec<f64>]) -> Vec<Self> {
         let count = nuisances.first().map_or(0, Vec::len);
         let of = |index: usize| {
@@ -61,20 +58,19 @@ impl Further {
     }
 }
 
-/// Presses of the regression: averages of rows at equal position and nuisance coordinates.
+/// Averages of rows with equal coordinates.
 ///
-/// Rough texture or misplacement that repeats at a position is noise to interpolation, which the process
-/// estimates. The scatter of repeats about their mean is the noise of a reading.
+/// Texture that repeats at a position is noise to interpolation; the scatter of repeats is noise of a
+/// reading.
 pub(super) struct Presses {
     pub readings: Scale,
     pub nuisance: Scale,
-    /// Position, nuisance coordinate if any, and further ones: n × d.
+    /// Position, nuisance coordinate and further ones, n × d.
     pub coordinates: Array2<f64>,
     /// Mean scaled readings, n × m.
     pub means: Array2<f64>,
     /// Press of each row.
     pub places: Vec<usize>,
-    /// Scaled readings, row by row.
     pub outputs: Array2<f64>,
     pub has_nuisance: bool,
     pub further: Vec<Further>,
@@ -141,12 +137,11 @@ impl Presses {
         })
     }
 
-    /// Number of table coordinates: position and first nuisance coordinate.
+    /// Number of table coordinates.
     pub fn searched(&self) -> usize {
         self.coordinates.ncols() - self.further.len()
     }
 
-    /// Number of position coordinates.
     pub fn dimensions(&self) -> usize {
         self.searched() - usize::from(self.has_nuisance)
     }

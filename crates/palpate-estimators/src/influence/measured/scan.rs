@@ -1,9 +1,7 @@
-//! Coarse search over the middles of a table's cells, eight cells side by side.
+//! Coarse search over the middles of a table's cells.
 //!
-//! With equal weights w along a position's line (by its largest variance), |z − μ|² = Σ w·z² − 2·Σ w·μ·z + Σ
-//! w·μ² takes one product per channel and node. For two nodes with squares r₀ and r₁ and squared distance d²,
-//! the segment between them is closest at s = (r₀ + d² − r₁)/(2·d²). The table has 1/d², as division is slow.
-//! Reading the products from memory dominates the time.
+//! With weights w by a line's largest variance, |z − μ|² = Σ w·z² − 2·Σ w·μ·z + Σ w·μ². Between nodes with
+//! the squares r₀ and r₁ at the distance d, the segment is closest at s = (r₀ + d² − r₁)/(2·d²).
 
 use super::table::Table;
 use crate::influence::inversion::{CellBlocks, Cells};
@@ -11,7 +9,6 @@ use crate::influence::lanes::{LANES, Lanes};
 use crate::influence::noise::Whitening;
 use palpate_numerics::simd::Eight;
 
-/// Products of the middles of cells, in blocks of eight.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Scan {
     cells: usize,
@@ -21,7 +18,7 @@ pub(super) struct Scan {
     weights: Vec<Lanes>,
     /// w·μ, node by node and channel by channel.
     products: Vec<Lanes>,
-    /// Σ w·μ² of each node; below, Σ w·d² to the next node.
+    /// Σ w·μ², and Σ w·d² to the next node.
     squares: Vec<Lanes>,
     ways: Vec<Lanes>,
     /// 1/Σ w·d², finite for equal nodes.
@@ -31,7 +28,6 @@ pub(super) struct Scan {
 }
 
 impl Scan {
-    /// Tabulates the middles of `cells`.
     pub fn new(table: &Table, whitening: &Whitening, cells: Cells) -> Self {
         let (channels, nodes) = (table.channels(), table.nuisance.count);
         let blocks = cells.len().div_ceil(LANES);
@@ -76,7 +72,7 @@ impl CellBlocks for Scan {
         self.cells
     }
 
-    /// Least squared residual of each cell of a block, and the nuisance coordinate there.
+    /// Least squared residual of each cell, and the nuisance coordinate there.
     #[inline(always)]
     fn look<V: Eight>(&self, block: usize, reading: &[f64]) -> [V; 3] {
         let (zero, one, two) = (V::splat(0.0), V::splat(1.0), V::splat(2.0));

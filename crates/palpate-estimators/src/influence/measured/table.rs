@@ -16,7 +16,7 @@ pub struct Table {
     pub nuisance: Axis,
     /// W·f̄, channel by channel, node by node.
     pub means: Vec<f64>,
-    /// v: process variance over the signal's, 0 to 1, node by node.
+    /// v: process variance over the signal's, node by node.
     pub variances: Vec<f64>,
 }
 
@@ -27,17 +27,15 @@ impl Table {
         self
     }
 
-    /// Returns the number of positions (x, y).
+    /// Number of positions (x, y).
     pub fn places(&self) -> usize {
         self.x.count * self.y.count
     }
 
-    /// Number of channels of a reading.
     pub(super) fn channels(&self) -> usize {
         self.means.len() / self.variances.len().max(1)
     }
 
-    /// Mean of a channel at a nuisance node of a position.
     pub(super) fn mean(&self, place: usize, node: usize, channel: usize) -> f64 {
         self.means[(place * self.nuisance.count + node) * self.channels() + channel]
     }

@@ -1,5 +1,4 @@
-//! The method on surfaces whose readings are known functions, and on other people's recordings by the protocol that
-//! comes with them.
+//! Tests on surfaces of known readings, and on published recordings by their own protocols.
 
 use std::sync::LazyLock;
 
@@ -41,7 +40,7 @@ fn noise(rng: &mut Xoshiro256PlusPlus) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// Two pressures that rise with force faster than it does, with 1 % of noise.
+/// Two pressures that rise faster than in proportion to the force, with 1 % noise.
 fn squeeze(x_m: f64, force_n: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
     let u = x_m / 0.1;
     let clean = [force_n.powf(1.2) * (1.6 - u), force_n.powf(1.1) * (0.4 + u * u)];
@@ -86,8 +85,8 @@ fn an_unknown_force_is_found_with_the_position_and_intervals_cover() {
     assert!((0.7..1.4).contains(&scores) && (0.7..1.4).contains(&force_scores), "{scores} {force_scores}");
 }
 
-/// Fails unless estimates are the mean and deviation of a plain sum over the whole grid: within a fiftieth of a
-/// deviation on average, and hardly ever a third of one off.
+/// Compares estimates with mean and standard deviation of a sum over the whole grid: 2 % of a standard
+/// deviation on average, and rarely a third.
 fn check_against_sum<'a>(
     locator: &MeasuredLocator,
     readings: impl Iterator<Item = &'a [f64]>,
@@ -97,7 +96,7 @@ fn check_against_sum<'a>(
     for reading in readings {
         let sum = locator.summed_everywhere(reading, per_node);
         let estimate = locator.locate(reading);
-        // A place alone in the plain sum is no sum; of several modes the estimate is but one.
+        // A sum over a single node is unreliable, and the estimate is one of several modes.
         if estimate.status != Status::Located {
             continue;
         }
@@ -116,7 +115,7 @@ fn check_against_sum<'a>(
     let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
     let far = shifts.iter().filter(|shift| **shift > 0.3).count();
     let (shift, width) = (mean(&shifts), mean(&widths));
-    // A hollow in the cost that no minimum was looked for in is left out of a sum.
+    // The estimate lacks a local minimum that the coarse search misses.
     assert!(shift < 0.02 && far <= shifts.len() / 100, "{shift}, {far} of {} far off", shifts.len());
     assert!((width - 1.0).abs() < 0.03, "{width}");
 }
@@ -177,7 +176,7 @@ fn a_named_nuisance_coordinate_comes_before_the_force_and_is_not_told() {
     assert_eq!(error, MeasuredError::NuisanceMissing { what: "nuisance coordinate", row: 8 });
 }
 
-/// Four sensors at a pad's corners, read with a common gain error and noise of their own.
+/// Four sensors at a pad's corners, with a common gain error and independent noise.
 fn corner(position: Position, gain: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
     let (u, v) = (position.x_m / 0.03, position.y_m / 0.03);
     let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
@@ -187,7 +186,7 @@ fn corner(position: Position, gain: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
     Row { position, force_n: None, nuisances: Vec::new(), time_s: None, reading }
 }
 
-/// The same sensors over a soft pad that is dented by so many millimetres.
+/// Sensors of [`corner`] over a soft pad that is indented by `depth_mm`.
 fn dent(position: Position, depth_mm: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
     let mut row = corner(position, 0.0, rng);
     row.reading
@@ -219,7 +218,7 @@ fn repeats_tell_a_pads_noise_and_gain_and_its_intervals_cover() {
         let within = |(low, high): (f64, f64), value| i32::from(low <= value && value <= high);
         covered += within(uncertainty.x_95_m, position.x_m) + within(uncertainty.y_95_m, position.y_m);
     }
-    // A little modest: what the gain does to the means is noise to the process as well.
+    // Slightly conservative: the gain error of the means is noise to the process as well.
     assert!((0.5..1.3).contains(&scores), "{scores}");
     assert!((368..=396).contains(&covered), "{covered} of 400");
 }
@@ -273,7 +272,7 @@ fn awkward_recordings_give_a_locator_or_clear_words() {
         let estimate = fit(&setup, &raw_recording(rows)).locate(&[1.0, 2.0]);
         assert!(estimate.contact.position.x_m.is_finite(), "{estimate:?}");
     }
-    // Without the one place beside the others the rest are on a line.
+    // Without the fifth position the others are on a line.
     let on_a_line = [(0.0, 0.0), (0.01, 0.0), (0.02, 0.0), (0.03, 0.0), (0.0, 0.03)];
     let presses = on_a_line.into_iter().flat_map(|(x_m, y_m)| {
         let press = move |k: f64| Row {
@@ -307,7 +306,7 @@ fn it_comes_back_from_a_file() {
     assert!(fault.to_string().contains("table means"), "{fault}");
 }
 
-/// Presses one after the other along the strip, whose order is that of their positions.
+/// Presses along the strip in the order of their positions.
 #[test]
 fn presses_that_are_no_multiple_of_the_force_tell_no_drift() {
     let setup = raw_setup(*STRIP, 2, None);
@@ -324,7 +323,8 @@ fn presses_that_are_no_multiple_of_the_force_tell_no_drift() {
     }
 }
 
-/// Presses of a strip whose readings saturate, with an untouched row after each, while the channels drift by up to a sixth of their range.
+/// Presses of a strip with saturating readings and an untouched row after each, while the channels drift by
+/// up to a sixth of their range.
 fn saturating_presses_under_drift(seed: u64) -> Recording {
     const DRIFTS: [f64; 4] = [160.0, -90.0, 40.0, -10.0];
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
@@ -349,7 +349,8 @@ fn saturating_presses_under_drift(seed: u64) -> Recording {
     raw_recording(rows.collect())
 }
 
-/// Presses held out are tared by the drift that the structure, or else the untouched rows, show: otherwise the check of intervals fails.
+/// Held-out rows are tared by the drift of the structure, or of the untouched rows: otherwise the check of
+/// intervals fails.
 #[test]
 fn every_structure_is_checked_without_the_drift() {
     let setup = raw_setup(*STRIP, 4, None);
@@ -366,8 +367,8 @@ fn every_structure_is_checked_without_the_drift() {
     }
 }
 
-/// Fails unless the pooled errors of five folds by position undercut scikit-learn's best, `median_mm` and `mean_mm`, by the share `less`,
-/// and the 95 % regions hold about as many contacts as they say.
+/// Requires pooled errors of five folds by position below scikit-learn's best, `median_mm` and `mean_mm`, by
+/// the share `less`, and about nominal coverage of the 95 % regions.
 fn check(name: &str, recorded: Option<(Setup, Recording)>, (median_mm, mean_mm): (f64, f64), less: f64) {
     let Some((setup, recording)) = recorded else { return };
     let task = FitTask::new(&setup, &recording).seed(1);
@@ -418,7 +419,8 @@ fn settings_that_need_mechanics_are_refused() {
     assert!(refused(good).contains("0 distinct positions"));
 }
 
-/// Four channels of a strip that is pressed to a depth, whose offsets move with the temperature by 3 to 8 times their noise of 0.05.
+/// Four channels of an indented strip, with offsets that move with temperature by 3 to 8 times their noise of
+/// 0.05.
 fn warm(x_m: f64, depth_mm: f64, temperature: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
     let u = x_m / 0.1;
     let shifts = [0.3, -0.15, 0.2, -0.4];
@@ -435,7 +437,7 @@ fn warm(x_m: f64, depth_mm: f64, temperature: f64, rng: &mut Xoshiro256PlusPlus)
     }
 }
 
-/// Presses at 31 places to 6 depths, each at a temperature of its own.
+/// Presses at 31 positions to 6 depths, each at its own temperature.
 fn warm_presses(rng: &mut Xoshiro256PlusPlus) -> Recording {
     let presses =
         (0..31).flat_map(|i| (0..6).map(move |k| (0.1 / 30.0 * f64::from(i), 0.5 + 0.3 * f64::from(k))));
@@ -446,7 +448,8 @@ fn warm_presses(rng: &mut Xoshiro256PlusPlus) -> Recording {
     raw_recording(rows.collect())
 }
 
-/// Mean error in millimetres of 1500 touches at random depths and temperatures, and the share that 95 % intervals hold.
+/// Mean error in millimetres and coverage of 95 % intervals, for 1500 contacts at random depths and
+/// temperatures.
 fn judge_warm(locator: &MeasuredLocator, rng: &mut Xoshiro256PlusPlus) -> (f64, f64) {
     const TOUCHES: u32 = 1500;
     let (mut error_m, mut held) = (0.0, 0);
@@ -498,7 +501,8 @@ fn a_further_nuisance_coordinate_that_never_changes_does_nothing_and_a_missing_o
     assert_eq!(with, fit(&setup, &recording));
 }
 
-/// The paper's beam as raw channels with noise of 5 µm, pressed with a weight so often at each of so many even places, never untouched.
+/// The paper's beam as raw channels with noise of 5 µm, pressed by a weight `times` times at each of `places`
+/// even positions, without untouched rows.
 fn weighed((places, times): (usize, usize), from_m: f64, rng: &mut Xoshiro256PlusPlus) -> (Setup, Recording) {
     let names = ["a", "b", "c", "d", "e", "f", "g", "h"];
     let setup = Setup::measured(0.4, &names).unwrap().known_force(3.0).unwrap();
@@ -518,7 +522,7 @@ fn weight(x_m: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
     Row { position, force_n: None, nuisances: Vec::new(), time_s: None, reading }
 }
 
-/// A sample of the experiment `weight-without-untouched-rows`.
+/// Sample of the experiment `weight-without-untouched-rows`.
 #[test]
 fn presses_of_one_weight_without_untouched_rows_have_intervals_that_hold() {
     const BOARDS: usize = 2;
@@ -538,7 +542,8 @@ fn presses_of_one_weight_without_untouched_rows_have_intervals_that_hold() {
                 (low_m..=high_m).contains(&x_m) || estimate.status == Status::OutsideModel
             };
             let held = (0..READINGS).filter(|i| is_held(*i, &mut rng)).count();
-            // Of 40 readings at 90 %, the lowest of the experiment, fewer than 30 are held in three samples of a thousand.
+            // At 90 % coverage, the lowest of the experiment, fewer than 30 of 40 readings occur in three
+            // samples of a thousand.
             assert!(held >= 30, "{presses:?}, {x_m} m: {held} of {READINGS}");
         }
     }
