@@ -11,7 +11,7 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::FEWEST_FOR_95;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-use crate::influence::LearningMemo;
+use crate::fit_memo::FitMemo;
 use crate::interval_check::{HeldOutEstimate, IntervalCheck};
 pub use crate::locator_fault::LocatorFault;
 use crate::offset_course::OffsetCourse;
@@ -36,7 +36,7 @@ pub struct FitTask<'a> {
     /// Watch, for progress and cancellation.
     pub watch: Watch<'a>,
     /// Influence functions that fits of this setup share.
-    pub(crate) memo: Option<&'a LearningMemo<'a>>,
+    pub(crate) memo: Option<&'a FitMemo<'a>>,
 }
 
 impl<'a> FitTask<'a> {
@@ -58,7 +58,7 @@ impl<'a> FitTask<'a> {
     }
 
     /// Sets the shared influence functions, unless there are some.
-    pub(crate) fn memo(self, memo: &'a LearningMemo<'a>) -> Self {
+    pub(crate) fn memo(self, memo: &'a FitMemo<'a>) -> Self {
         Self { memo: self.memo.or(Some(memo)), ..self }
     }
 
@@ -248,7 +248,7 @@ pub(crate) fn fit_with_interval_check<E: Fit + ?Sized>(
     estimator: &E,
     task: FitTask,
 ) -> Result<Fitted<E::Method>, E::Error> {
-    let memo = LearningMemo::new(task.setup);
+    let memo = FitMemo::new(task.setup);
     let task = task.memo(&memo);
     let locator = estimator.fit_without_interval_check(task)?;
     let interval_check = check_intervals(estimator, task)?;
@@ -303,7 +303,7 @@ pub(crate) struct HoldOutTask<'a> {
     pub seed: u64,
     pub clock: &'a dyn Fn() -> f64,
     pub watch: Watch<'a>,
-    pub memo: Option<&'a LearningMemo<'a>>,
+    pub memo: Option<&'a FitMemo<'a>>,
 }
 
 impl HoldOutTask<'_> {

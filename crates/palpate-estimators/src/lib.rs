@@ -33,6 +33,7 @@ pub mod estimator;
 pub mod evaluation;
 pub mod features;
 pub mod fit;
+mod fit_memo;
 #[cfg(test)]
 mod fixtures;
 pub mod force_prior;

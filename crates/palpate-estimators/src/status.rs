@@ -2,8 +2,8 @@
 //!
 //! - `no_contact`: noise exceeds the squared length |d|² of the whitened reading more often than half the
 //!   [`FalseAlarmRate`], and the best contact reduces |d|² by at most its cost: the extended Bayesian
-//!   information criterion at 0.2 %, with Φ(−√cost) in proportion to the rate. The actual rate is 0.3 to 1
-//!   times the set one (docs/validation/tables/at-the-limit.md), exact with the `NoiseBounds` of force-linear
+//!   information criterion at 0.2 %, with Φ(−√cost) in proportion to the rate. The actual rate is 0.3 to 1.3
+//!   times the set one (docs/validation/false-alarms.md), exact with the `NoiseBounds` of force-linear
 //!   surfaces.
 //! - `outside_model`: the best χ² exceeds its critical value at [`OUTSIDE_MODEL_RATE`], or the contact seems
 //!   distributed at [`SPREAD_RATE`] (not for digits).

@@ -4,9 +4,8 @@ use super::trial_splits::TrialSplits;
 use super::{Estimator, FitError, Locator, contenders};
 use crate::evaluation::{Evaluation, Located, Split};
 use crate::fit::{FitTask, fit_with_interval_check};
-use crate::influence::{
-    Influence, InfluenceFitError, LearningMemo, Structure, is_one_weight, is_unsaturated,
-};
+use crate::fit_memo::FitMemo;
+use crate::influence::{Influence, InfluenceFitError, Structure, is_one_weight, is_unsaturated};
 use crate::offset_course::OffsetCourse;
 use crate::reading_check::ReadingCheck;
 use crate::recording::Recording;
@@ -216,13 +215,13 @@ pub fn take_off_drift(
     splits: &mut [Split],
     watch: Watch,
 ) -> Result<Option<Vec<f64>>, InfluenceFitError> {
-    subtract_drift(splits, watch, &LearningMemo::new(setup))
+    subtract_drift(splits, watch, &FitMemo::new(setup))
 }
 
 fn subtract_drift(
     splits: &mut [Split],
     watch: Watch,
-    memo: &LearningMemo,
+    memo: &FitMemo,
 ) -> Result<Option<Vec<f64>>, InfluenceFitError> {
     let mut spans: Option<Vec<f64>> = None;
     for Split { training, judged, offsets, .. } in splits {
@@ -269,7 +268,7 @@ fn choose(task: FitTask, candidates: Vec<Estimator>, limit: Option<TimeLimit>) -
     let unsuited = |error| FitError::Choice(Box::new(error));
     let mut splits =
         Split::by_folds(&recording, CHOICE_FOLDS.min(positions)).map_err(|error| unsuited(error.into()))?;
-    let own = LearningMemo::new(setup);
+    let own = FitMemo::new(setup);
     let memo = task.memo.unwrap_or(&own);
     let whole = FitTask::new(setup, &recording).watch(limited).memo(memo);
     let course = Influence::default().offset_course(whole, &recording);

@@ -35,10 +35,11 @@ use crate::closed_form::{ClosedForm, ClosedFormFitError, ClosedFormLocator};
 use crate::digit::{DigitEstimator, DigitFitError, DigitLocator, DigitShape, DigitTheory};
 use crate::evaluation::EvaluationError;
 use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, NoCheck, SeedQueue};
+use crate::fit_memo::FitMemo;
 use crate::gaussian_process::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
 use crate::influence::{
     BeamLikelihood, ForceLinearLocator, Influence, InfluenceFitError, InfluenceLocator, InfluencesAtNodes,
-    LearningMemo, PlateLikelihood, Structure,
+    PlateLikelihood, Structure,
 };
 use crate::lightest_touch::LightestTouch;
 use crate::likelihood::{Likelihood, UntouchedSurface};
@@ -132,7 +133,7 @@ macro_rules! estimators {
             }
 
             fn fit_task(&self, task: FitTask) -> Result<Locator, FitError> {
-                let memo = LearningMemo::new(task.setup);
+                let memo = FitMemo::new(task.setup);
                 let task = task.memo(&memo);
                 let choice = self.decide(task, None)?;
                 self.fit_decided(task, choice.as_ref())

@@ -3,7 +3,7 @@
 use super::{Estimator, FitError, Locator, is_learnt};
 use crate::evaluation::{EvaluationError, Split, TimedEvaluation, evaluate_held_out};
 use crate::fit::{FitTask, HoldOutTask};
-use crate::influence::LearningMemo;
+use crate::fit_memo::FitMemo;
 use crate::reading_check::ReadingCheck;
 use crate::setup::Setup;
 use palpate_numerics::watch::Watch;
@@ -14,7 +14,7 @@ pub(super) struct TrialSplits<'a> {
     splits: &'a [Split],
     seed: u64,
     clock: &'a dyn Fn() -> f64,
-    memo: Option<&'a LearningMemo<'a>>,
+    memo: Option<&'a FitMemo<'a>>,
     checks: Vec<OnceCell<TimedCheck>>,
 }
 
@@ -30,7 +30,7 @@ impl<'a> TrialSplits<'a> {
     }
 
     /// Shares influence functions among the estimators. The time of learning them then counts for the first alone.
-    pub fn memo(self, memo: &'a LearningMemo<'a>) -> Self {
+    pub fn memo(self, memo: &'a FitMemo<'a>) -> Self {
         Self { memo: Some(memo), ..self }
     }
 

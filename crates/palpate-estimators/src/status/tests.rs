@@ -314,7 +314,7 @@ fn surfaces_with_a_model_exceed_another_rate_no_more_than_the_default_one() {
         };
         let alarms = (0..READINGS).filter(is_alarm).count();
         println!("{} at {rate}, force {force_n:?}: {alarms} of {READINGS}", locator.kind());
-        // Up to one and a half times the rate, as at 0.1 % in docs/validation/tables/at-the-limit.md.
+        // At 0.1 % up to 1.3 times the rate (docs/validation/false-alarms.md).
         assert!((READINGS / 200..=3 * READINGS / 200).contains(&alarms), "{}: {alarms}", locator.kind());
     }
 }

@@ -57,10 +57,14 @@ impl Learnt {
         most_presses: usize,
     ) -> Result<Option<Arc<Self>>, MeasuredError> {
         let FitTask { setup, recording, watch, memo, .. } = task;
-        let learn = || Self::new(setup, recording, structure, most_presses, watch);
+        let learn =
+            || Self::new(setup, recording, structure, most_presses, watch).map(|learnt| learnt.map(Arc::new));
         match memo {
-            Some(memo) => memo.get_or_learn((setup, recording), (structure, most_presses), learn),
-            None => Ok(learn()?.map(Arc::new)),
+            Some(memo) => {
+                let options = (structure, most_presses);
+                Ok((*memo.get_or_compute((setup, recording), options, learn)?).clone())
+            }
+            None => learn(),
         }
     }
 

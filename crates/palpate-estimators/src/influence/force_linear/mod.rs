@@ -11,7 +11,6 @@ mod force_prior;
 mod learning;
 mod left_out;
 mod locator;
-mod memo;
 mod outliers;
 mod place_noise;
 mod place_noise_search;
@@ -28,7 +27,6 @@ mod shared_errors;
 pub use drift::DriftCourse;
 pub(crate) use learning::{FOLDS, MOST_PRESSES, MOST_SEARCHED};
 pub use locator::{ForceLinearLocator, Scatter};
-pub(crate) use memo::LearningMemo;
 pub use prior::Source;
 
 use super::config::Structure;
