@@ -20,6 +20,11 @@ fn is_worse(stored: Figure, measured: Figure, goal: Goal) -> bool {
     loss > STANDARD_ERRORS * stored.standard_error.hypot(measured.standard_error) + rounding
 }
 
+/// True for a figure of a quick experiment with one value or calibration, which has no standard error.
+fn is_alone(stored: Figure, measured: Figure, size: Size) -> bool {
+    size == Size::Quick && measured.standard_error == 0.0 && stored.standard_error > 0.0
+}
+
 /// Figures that are worse than stored, a line each: experiment, row, column, stored and measured value. A figure that is stored and not measured is a
 /// line too, and so is a table or row, except that quick experiments have some of the rows alone.
 pub fn worse_figures(stored: &Report, measured: &Report) -> Vec<String> {
@@ -41,7 +46,7 @@ fn worse_in_table(stored: &Table, measured: &Table, size: Size) -> Vec<String> {
     let mut lines = Vec::new();
     for row in &stored.rows {
         match measured.rows.iter().find(|other| other.labels == row.labels) {
-            Some(other) => lines.extend(worse_in_row(stored, row, measured, other)),
+            Some(other) => lines.extend(worse_in_row((stored, row), (measured, other), size)),
             None if size == Size::Quick => {}
             None => lines.push(format!("row not measured: {}", row.name())),
         }
@@ -49,7 +54,7 @@ fn worse_in_table(stored: &Table, measured: &Table, size: Size) -> Vec<String> {
     lines
 }
 
-fn worse_in_row(stored: &Table, row: &Row, measured: &Table, other: &Row) -> Vec<String> {
+fn worse_in_row((stored, row): (&Table, &Row), (measured, other): (&Table, &Row), size: Size) -> Vec<String> {
     let mut lines = Vec::new();
     for (column, figure) in stored.columns.iter().zip(&row.figures) {
         let Some(figure) = figure else { continue };
@@ -60,7 +65,7 @@ fn worse_in_row(stored: &Table, row: &Row, measured: &Table, other: &Row) -> Vec
             format!("{value:.3} ± {standard_error:.3} {unit}").trim_end().to_owned()
         };
         match found {
-            Some(found) if !is_worse(*figure, found, column.goal) => {}
+            Some(found) if !is_worse(*figure, found, column.goal) || is_alone(*figure, found, size) => {}
             Some(found) => lines.push(format!(
                 "{}, {}: stored {}, measured {}",
                 row.name(),
@@ -69,6 +74,8 @@ fn worse_in_row(stored: &Table, row: &Row, measured: &Table, other: &Row) -> Vec
                 shown(found)
             )),
             None if column.goal == Goal::None => {}
+            // Few readings may have no contact that is detected.
+            None if size == Size::Quick && other.failure.is_none() => {}
             None => {
                 let reason = other.failure.as_deref().unwrap_or("no figure");
                 let name = row.name();
@@ -106,6 +113,15 @@ mod tests {
         assert!(!is_worse(figure(98.0, 0.3), figure(92.0, 0.4), Goal::COVERAGE));
         assert!(is_worse(figure(95.0, 0.3), figure(92.9, 0.4), Goal::COVERAGE));
         assert!(is_worse(figure(95.0, 0.3), figure(97.1, 0.4), Goal::COVERAGE));
+    }
+
+    #[test]
+    fn quick_figures_without_a_standard_error_are_not_compared() {
+        let [stored, alone] = [figure(1.0, 0.1), figure(9.0, 0.0)];
+        assert!(is_alone(stored, alone, Size::Quick));
+        assert!(!is_alone(stored, alone, Size::Full));
+        assert!(!is_alone(stored, figure(9.0, 0.1), Size::Quick));
+        assert!(!is_alone(figure(1.0, 0.0), alone, Size::Quick));
     }
 
     fn report(rows: Vec<Row>) -> Report {

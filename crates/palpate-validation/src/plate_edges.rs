@@ -87,7 +87,7 @@ impl Bench {
 }
 
 fn run(size: Size, progress: Progress) -> Result<Vec<Table>> {
-    let (calibrations, readings) = size.pick((20, 100), (2, 50));
+    let (calibrations, readings) = size.pick((20, 100), (4, 50));
     let bench = Bench::new()?;
     let seeds: Vec<u64> = (0..calibrations).collect();
     let fitted = in_parallel(&seeds, |seed| bench.fit(*seed), |seed| format!("calibration {seed}"), progress);

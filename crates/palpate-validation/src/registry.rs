@@ -2,8 +2,8 @@
 
 use crate::experiment::Experiment;
 use crate::{
-    beam_ends, load_patches, load_profiles, measured_edges, one_weight, plate_edges, plate_limit,
-    real_benches, strips, weighed,
+    beam_ends, drift_and_creep, false_alarms, influence_sources, load_patches, load_profiles, measured_edges,
+    moving_contacts, one_weight, plate_edges, plate_limit, real_benches, statuses, strips, weighed,
 };
 use anyhow::{Context, Result};
 
@@ -13,6 +13,9 @@ pub const EXPERIMENTS: &[Experiment] = &[
     one_weight::EXPERIMENT,
     load_profiles::EXPERIMENT,
     load_patches::EXPERIMENT,
+    statuses::EXPERIMENT,
+    false_alarms::EXPERIMENT,
+    influence_sources::EXPERIMENT,
     beam_ends::EXPERIMENT,
     plate_edges::EXPERIMENT,
     plate_limit::EXPERIMENT,
@@ -24,6 +27,8 @@ pub const EXPERIMENTS: &[Experiment] = &[
     strips::NOISE,
     strips::FEW,
     weighed::EXPERIMENT,
+    moving_contacts::EXPERIMENT,
+    drift_and_creep::EXPERIMENT,
 ];
 
 /// The experiments of these names; all of them without a name.

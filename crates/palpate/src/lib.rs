@@ -34,6 +34,11 @@
 
 pub mod prelude;
 
+/// The programs of the reference page.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/reference/rust.md")]
+pub mod reference_page {}
+
 pub use palpate_design as design;
 pub use palpate_estimators as estimators;
 pub use palpate_mechanics as mechanics;

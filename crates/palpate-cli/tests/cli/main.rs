@@ -13,6 +13,7 @@ mod digit;
 mod feeds;
 mod hand_at_terminal;
 mod help;
+mod how_to;
 mod init;
 mod json_names;
 mod kept_alarms;

@@ -18,7 +18,7 @@ fn blocks<'a>(page: &'a str, language: &'a str) -> impl Iterator<Item = (&'a str
 }
 
 /// Words of a command line, of which some are in quotes, without its comment.
-fn words(line: &str) -> Vec<String> {
+pub fn words(line: &str) -> Vec<String> {
     let mut words = Vec::new();
     for (i, part) in line.split('"').enumerate() {
         if i % 2 == 1 {
@@ -55,7 +55,7 @@ fn run_tutorial(name: &str) -> Vec<String> {
 }
 
 /// Copies the files of a folder and of the folders in it.
-fn copy(from: &Path, to: &Path) {
+pub fn copy(from: &Path, to: &Path) {
     fs::create_dir_all(to).unwrap();
     for entry in fs::read_dir(from).unwrap() {
         let path = entry.unwrap().path();
