@@ -10,6 +10,7 @@ use palpate_estimators::estimator::Locator;
 use palpate_estimators::evaluation::{Evaluation, limit_ratio};
 use palpate_rig::Rig;
 
+use crate::support::attempt::PATIENCE;
 use crate::support::command::{Running, complained, palpate, said};
 
 const RIG: &str = include_str!("../../../../examples/fsi-like.toml");
@@ -224,7 +225,7 @@ fn ends_with_its_words(firmware: &str, (config, _, finger, taken): &FaultCase, w
     assert!(said.contains(kept), "{firmware} {config}: {said}");
     assert!(!folder.path().join("locator.json").exists(), "{firmware} {config}");
     assert_eq!(taken_presses(folder.path()), *taken, "{firmware} {config}");
-    let (_, stopped) = bench.said.recv_timeout(Duration::from_secs(5)).unwrap();
+    let (_, stopped) = bench.said.recv_timeout(PATIENCE).unwrap();
     assert!(stopped.ends_with(&format!("stopped with its finger {finger}")), "{config}: {stopped}");
 }
 
@@ -282,7 +283,7 @@ fn stopped_by(signal: &str, code: i32, firmware: &str) -> Duration {
     let asked = Instant::now();
     let id = child.id().to_string();
     std::process::Command::new("kill").args([&format!("-{signal}"), &id]).status().unwrap();
-    let (at, line) = bench.said.recv_timeout(Duration::from_secs(5)).expect("the machine is stopped");
+    let (at, line) = bench.said.recv_timeout(PATIENCE).expect("the machine is stopped");
     assert!(line.contains("the machine was stopped"), "{line}");
     assert_eq!(child.wait().unwrap().code(), Some(code), "{signal}");
     let rest: Vec<String> = lines.collect();
