@@ -107,11 +107,11 @@ const FILES: [(&str, &[&str]); 16] = [
     ("board.json", &["fit", "bench.toml", "-o", "board.json"]),
     (
         "press.mcap",
-        &["record", "locator.json", "--from", BOARD, "--duration", "0.2 s", "--out", "press.mcap"],
+        &["record", "locator.json", "--from", BOARD, "--duration", "2 s", "--out", "press.mcap"],
     ),
     (
         "killed.mcap",
-        &["record", "locator.json", "--from", BOARD, "--duration", "0.2 s", "--out", "killed.mcap"],
+        &["record", "locator.json", "--from", BOARD, "--duration", "2 s", "--out", "killed.mcap"],
     ),
     ("coarse.toml", &[]),
     ("alarms.toml", &[]),
@@ -126,7 +126,7 @@ const REPLACED: [(&str, &str); 11] = [
     ("192.168.1.5:8377", "127.0.0.1:0"),
     ("mqtt://user@host:1883/", "mqtt://user@127.0.0.1:1/"),
     ("mqtt://host/", "mqtt://127.0.0.1:1/"),
-    ("--duration \"10 s\"", "--duration \"0.2 s\""),
+    ("--duration \"10 s\"", "--duration \"2 s\""),
     ("compare rig.toml", "compare rig.toml --only influence --only neighbours"),
     ("--counts 2..16", "--counts 2..3 --verify 1"),
     ("examples/paper.toml --count 5", "coarse.toml --count 2"),
@@ -248,7 +248,7 @@ impl<'a> Bench<'a> {
         let has = |word: &str| words.iter().any(|other| other == word);
         let mut arguments: Vec<&str> = words[1..].iter().map(String::as_str).collect();
         if arguments[0] == "record" && !has("--duration") {
-            arguments.extend(["--duration", "0.2 s"]);
+            arguments.extend(["--duration", "2 s"]);
         }
         if arguments[0] == "serve" {
             let address = if has("--listen") { &[][..] } else { &["--listen", "127.0.0.1:0"] };

@@ -85,7 +85,7 @@ fn names_are_those_of_the_manual() {
     .unwrap();
     let board = ["--data", "board/presses.csv", "-o", "board.json"];
     let design = ["--count", "3", "--trials", "1", "--calibrations", "1", "--verify", "1"];
-    let record = ["--from", "simulated:beam.toml?rate=200", "--duration", "0.3 s", "-o", "session.mcap"];
+    let record = ["--from", "simulated:beam.toml?rate=200", "--duration", "2 s", "-o", "session.mcap"];
     let calibrate = ["--from", "-", "--presses", "presses.csv", "-o", "c.json", "--resume"];
     let runs: [(&str, &[&str], &[&str]); 19] = [
         ("simulate", &["simulate", "beam.toml"], &["-o", "again.csv"]),
@@ -122,7 +122,7 @@ fn a_damaged_recording_is_told_in_json_too() {
     let folder = tempfile::tempdir().unwrap();
     prepare(folder.path());
     said(&run(folder.path(), &["fit", "beam.toml", "-o", "beam.json"]));
-    let record = ["--from", "simulated:beam.toml?rate=500", "--duration", "0.5 s", "-o", "session.mcap"];
+    let record = ["--from", "simulated:beam.toml?rate=500", "--duration", "2 s", "-o", "session.mcap"];
     said(&run(folder.path(), &[&["record", "beam.json"], &record[..]].concat()));
     let mut bytes = fs::read(folder.path().join("session.mcap")).unwrap();
     let middle = bytes.len() / 2;

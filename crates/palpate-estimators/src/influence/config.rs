@@ -32,7 +32,7 @@ pub enum Structure {
     Auto,
     /// Offset + force × influence(position).
     ForceLinear,
-    /// Force-linear, in channels that saturate.
+    /// Force-linear, in channels that saturate: readings of hard presses fall short of proportion to the force.
     ForceSaturating,
     /// Offset + force^p × influence(position), with one exponent p.
     ForceMonotone,

@@ -13,7 +13,7 @@ pub enum RepeatedReadings {
     /// Collapses runs that chance does not explain.
     #[default]
     Auto,
-    /// Collapses every run.
+    /// Collapses every run of repeated readings into one row.
     Collapse,
     /// Keeps every row.
     Keep,

@@ -27,9 +27,9 @@ use palpate_numerics::{Jacobi, carlson_rd, carlson_rf};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ForceDirection {
-    /// Normal to the bent finger.
+    /// Normal to the bent finger: a contact without friction.
     Normal,
-    /// Normal to the straight finger.
+    /// Normal to the straight finger: a weight on a horizontal finger.
     Vertical,
 }
 

@@ -32,7 +32,7 @@ pub struct PlateSpec {
     pub elements: usize,
 }
 
-/// Supports of the four edges.
+/// Supports of the four edges; edges without a key are free.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Edges {
@@ -50,7 +50,7 @@ pub struct Edges {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Edge {
-    /// No deflection.
+    /// No deflection; the edge can turn.
     Simple,
     /// No deflection, no slope.
     Clamped,
