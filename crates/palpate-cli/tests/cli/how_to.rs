@@ -105,10 +105,7 @@ const FILES: [(&str, &[&str]); 16] = [
     ("locator.json", &["fit", "bench.toml", "-o", "locator.json"]),
     ("other.json", &["fit", "bench.toml", "--seed", "1", "-o", "other.json"]),
     ("board.json", &["fit", "bench.toml", "-o", "board.json"]),
-    (
-        "press.mcap",
-        &["record", "locator.json", "--from", BOARD, "--duration", "2 s", "--out", "press.mcap"],
-    ),
+    ("press.mcap", &["record", "locator.json", "--from", BOARD, "--duration", "2 s", "--out", "press.mcap"]),
     (
         "killed.mcap",
         &["record", "locator.json", "--from", BOARD, "--duration", "2 s", "--out", "killed.mcap"],
