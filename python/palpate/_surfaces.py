@@ -17,9 +17,10 @@ from ._sections import (
     needed,
 )
 
-Quantity = Union[float, str]
 # Memory limit of a computation: bytes, or a text such as "2 GB"; None for no limit.
 Memory = Union[float, str, None]
+
+Quantity = Union[float, str]
 """A number in SI units, or a text with a unit: ``0.4`` and ``"400 mm"`` are the same length."""
 
 Point = Union[Quantity, Sequence[Quantity]]

@@ -58,7 +58,7 @@ impl Locator {
     /// Returns
     /// -------
     /// Estimate or Estimates
-    ///     Of one reading its numbers, of many their columns.
+    ///     The numbers of one reading, or a column of them for many.
     ///
     /// Raises
     /// ------
@@ -86,15 +86,15 @@ impl Locator {
         }
     }
 
-    /// Bring readings of a surface whose offsets have moved since its calibration to what calibration learnt.
+    /// Subtract the change of the channels' offsets since the calibration.
     ///
     /// Parameters
     /// ----------
     /// readings : array_like
     ///     One reading of the shape (channels), or many of the shape (readings, channels), in SI units or raw, in the order of time.
     /// untouched : array_like, optional
-    ///     Readings of the untouched surface, whose mean is what the channels read today: ``readings[:50]``. Where nothing is said, untouched
-    ///     readings are found among `readings` and their drift is followed.
+    ///     Readings of the untouched surface, such as ``readings[:50]``. Their mean is the present baseline. By default, `readings` themselves
+    ///     are searched for untouched ones, and the drift of these is subtracted.
     ///
     /// Returns
     /// -------
@@ -114,7 +114,7 @@ impl Locator {
         tare::tare(&self.inner, &self.channels, readings, untouched)
     }
 
-    /// Judge the locator: locate the contacts of a recording, and compare the estimates with their true positions.
+    /// Locate the contacts of a recording, and compare the estimates with the true positions.
     ///
     /// Parameters
     /// ----------
@@ -123,8 +123,8 @@ impl Locator {
     /// seed : int
     ///     Seed of the simulation.
     /// tare : "auto", int or array_like, optional
-    ///     Bring the recording's readings to what calibration learnt, as `tare` does: by untouched readings that are found among them
-    ///     ("auto"), by so many of the first ones, which are not judged then, or by untouched readings of the shape (readings, channels).
+    ///     Baseline of the recording, as for `tare`: its untouched readings ("auto"), a number of its first readings, which are not evaluated,
+    ///     or untouched readings of the shape (readings, channels).
     /// progress : bool or callable, optional
     ///     As of `Estimator.fit`.
     ///
@@ -141,7 +141,7 @@ impl Locator {
     /// Warns
     /// -----
     /// UserWarning
-    ///     Where the locator was fitted to this very file: at positions that it has not seen it is worse; `cross_validate` tells how much.
+    ///     If the locator was fitted to this file. Errors at other positions are larger; `cross_validate` estimates them.
     #[pyo3(signature = (recording=None, *, seed=0, tare=None, progress=None))]
     fn evaluate(
         &self,
@@ -206,9 +206,9 @@ impl Locator {
     /// smooth : bool
     ///     Go back over all of them, with what came later, instead of filtering them as they come.
     /// frequency : float or str, optional
-    ///     First natural frequency of a beam on two simple supports, in hertz or with a unit: its inertia is reckoned with.
+    ///     First natural frequency of a beam on two simple supports, in hertz or with a unit; the tracker then includes the inertia.
     /// damping : float, optional
-    ///     Share of the critical damping of its first mode; 0.01.
+    ///     Damping ratio of the first mode; 0.01.
     /// progress : bool or callable, optional
     ///     As of `Estimator.fit`.
     ///
@@ -234,7 +234,7 @@ impl Locator {
         slf.py().import("palpate._tracking")?.call_method1("track", arguments)
     }
 
-    /// Follow moving contacts reading by reading, as they come from sensors: what `track` tells of the same readings all at once.
+    /// Track moving contacts reading by reading; the results equal those of `track` for all readings at once.
     ///
     /// Parameters
     /// ----------
@@ -269,7 +269,7 @@ impl Locator {
         methods::tracker(slf.as_any(), frequency, damping)
     }
 
-    /// Tell how force is spread over the surface; see `load_profile`.
+    /// Estimate the distribution of the force over the surface; see `load_profile`.
     ///
     /// Parameters
     /// ----------
@@ -293,19 +293,19 @@ impl Locator {
         methods::load_profile(slf.as_any(), readings, loads, progress)
     }
 
-    /// Kind of its estimator: "influence".
+    /// Kind of the estimator, such as "influence".
     #[getter]
     fn kind(&self) -> &'static str {
         self.inner.kind()
     }
 
-    /// The setup of its readings.
+    /// Setup of the readings.
     #[getter]
     fn setup(&self) -> Setup {
         Setup(self.setup.clone())
     }
 
-    /// Seed of its fit.
+    /// Seed of the fit.
     #[getter]
     fn seed(&self) -> u64 {
         self.inner.provenance.seed
@@ -320,7 +320,7 @@ impl Locator {
     /// What `Auto` chose it by; None of another estimator.
     ///
     /// "best" is the kind; "tried" has of each contender "kind", "mean_error" in metres, "interval_score" in metres and "coverage" at
-    /// positions held out; "left_out" says who was not tried, and why.
+    /// positions held out; "left_out" names the estimators that were not tried, with the reason.
     #[getter]
     fn choice(&self, py: Python<'_>) -> Option<Py<PyDict>> {
         self.choice.as_ref().map(|choice| choice.clone_ref(py))
@@ -334,7 +334,7 @@ impl Locator {
         Ok(Some(py.import("json")?.call_method1("loads", (json,))?))
     }
 
-    /// Check of its 95 % intervals at held-out places; None where they were not checked, which takes 19 places.
+    /// Check of the 95 % intervals at held-out places; None with fewer than 19 places, where they are not checked.
     ///
     /// "places" is their number, "presses" that of the presses there, and "outside_model" the number of those that are `outside_model`. "position" and "force" (where it is estimated and was recorded) have the coverage "before_percent" and
     /// "after_percent", and the "factor" of at least 1 by which the intervals are widened.
@@ -376,7 +376,7 @@ impl Locator {
         write_whole(&path, json.as_bytes())
     }
 
-    /// Read a locator from its file, whoever wrote it.
+    /// Read a locator from a file.
     ///
     /// Parameters
     /// ----------
@@ -385,7 +385,7 @@ impl Locator {
     /// Raises
     /// ------
     /// FileError
-    ///     With line and column where there is a place, for what is no locator, or one of a version that this palpate does not read.
+    ///     For a file that is not a locator or has an unsupported version, with line and column where they are known.
     /// OSError
     ///     Where the file cannot be read.
     #[staticmethod]
@@ -400,7 +400,7 @@ impl Locator {
         Ok(Self::new(locator.map_err(|error| of_locator(&error, &name, &text))?, None))
     }
 
-    /// The locator as the text of its file.
+    /// The text of the locator's file.
     fn to_json(&self) -> PyResult<String> {
         self.inner.to_json().map_err(refused)
     }

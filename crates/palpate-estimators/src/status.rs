@@ -147,7 +147,8 @@ pub(crate) fn learnt_bounds<const N: usize>(
     })
 }
 
-pub(crate) const LINE_PLACES: usize = 33;
+/// Places along a line that a contact may have in the information criterion of its detection.
+pub const LINE_PLACES: usize = 33;
 
 /// Extended Bayesian information criterion (Chen and Chen, Biometrika 95, 2008): unknowns·ln channels + 2·ln
 /// places.

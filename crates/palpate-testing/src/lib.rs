@@ -4,6 +4,7 @@
 pub mod data;
 pub mod figure;
 pub mod json_numbers;
+pub mod random_field;
 pub mod skip;
 pub mod stopping;
 pub mod strip;

@@ -3,6 +3,7 @@
 use crate::coverage::Coverage;
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
+use crate::surfaces::paper_beam;
 use crate::table::{Row, Table};
 use anyhow::{Context, Result};
 use palpate::estimators::fit::NoCheck;
@@ -10,8 +11,7 @@ use palpate::estimators::influence::InfluenceSource;
 use palpate::estimators::simulate::clean_reading;
 use palpate::mechanics::sensing::{ChannelErrors, measure};
 use palpate::prelude::{
-    Beam, ClosedForm, Contact, Deflection, Fit, FitTask, Influence, Locate, Position, Setup, Training, gpa,
-    mm, newtons, um,
+    ClosedForm, Contact, Fit, FitTask, Influence, Locate, Position, Setup, Training, mm, newtons, um,
 };
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -88,8 +88,7 @@ type BoxedLocator = Box<dyn Locate<Check = NoCheck>>;
 
 impl Case {
     fn setup(&self) -> Result<Setup> {
-        let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-        let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
+        let setup = paper_beam(um(5.0))?;
         Ok(if self.is_known { setup.known_force(newtons(3.0))? } else { setup })
     }
 

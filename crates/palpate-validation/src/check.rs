@@ -8,8 +8,11 @@ use crate::table::{Figure, Goal, Row, Table};
 const STANDARD_ERRORS: f64 = 4.0;
 
 /// True where a measured figure is worse than the stored one by more than [`STANDARD_ERRORS`] standard errors of their difference √(σ₁² + σ₂²).
-/// For a goal of [`Goal::Near`] the loss is the growth of the distance from it.
+/// Figures without a standard error are not compared. For a goal of [`Goal::Near`] the loss is the growth of the distance from it.
 fn is_worse(stored: Figure, measured: Figure, goal: Goal) -> bool {
+    let (Some(stored_error), Some(measured_error)) = (stored.standard_error, measured.standard_error) else {
+        return false;
+    };
     let loss = match goal {
         Goal::Smaller => measured.value - stored.value,
         Goal::Larger => stored.value - measured.value,
@@ -17,12 +20,7 @@ fn is_worse(stored: Figure, measured: Figure, goal: Goal) -> bool {
         Goal::None => return false,
     };
     let rounding = 1e-9 * stored.value.abs();
-    loss > STANDARD_ERRORS * stored.standard_error.hypot(measured.standard_error) + rounding
-}
-
-/// True for a figure of a quick experiment with one value or calibration, which has no standard error.
-fn is_alone(stored: Figure, measured: Figure, size: Size) -> bool {
-    size == Size::Quick && measured.standard_error == 0.0 && stored.standard_error > 0.0
+    loss > STANDARD_ERRORS * stored_error.hypot(measured_error) + rounding
 }
 
 /// Figures that are worse than stored, a line each: experiment, row, column, stored and measured value. A figure that is stored and not measured is a
@@ -61,11 +59,9 @@ fn worse_in_row((stored, row): (&Table, &Row), (measured, other): (&Table, &Row)
         let place = measured.columns.iter().position(|other| other.name == column.name);
         let found = place.and_then(|place| other.figures.get(place).copied().flatten());
         let unit = &column.unit;
-        let shown = |Figure { value, standard_error }: Figure| {
-            format!("{value:.3} ± {standard_error:.3} {unit}").trim_end().to_owned()
-        };
+        let shown = |figure: Figure| format!("{} {unit}", figure.text(3)).trim_end().to_owned();
         match found {
-            Some(found) if !is_worse(*figure, found, column.goal) || is_alone(*figure, found, size) => {}
+            Some(found) if !is_worse(*figure, found, column.goal) => {}
             Some(found) => lines.push(format!(
                 "{}, {}: stored {}, measured {}",
                 row.name(),
@@ -92,7 +88,7 @@ mod tests {
     use crate::table::Column;
 
     const fn figure(value: f64, standard_error: f64) -> Figure {
-        Figure { value, standard_error }
+        Figure { value, standard_error: Some(standard_error) }
     }
 
     #[test]
@@ -116,12 +112,10 @@ mod tests {
     }
 
     #[test]
-    fn quick_figures_without_a_standard_error_are_not_compared() {
-        let [stored, alone] = [figure(1.0, 0.1), figure(9.0, 0.0)];
-        assert!(is_alone(stored, alone, Size::Quick));
-        assert!(!is_alone(stored, alone, Size::Full));
-        assert!(!is_alone(stored, figure(9.0, 0.1), Size::Quick));
-        assert!(!is_alone(figure(1.0, 0.0), alone, Size::Quick));
+    fn figures_without_a_standard_error_are_not_compared() {
+        let [stored, alone] = [figure(1.0, 0.1), Figure::exact(9.0)];
+        assert!(!is_worse(stored, alone, Goal::Smaller));
+        assert!(!is_worse(alone, figure(19.0, 0.1), Goal::Smaller));
     }
 
     fn report(rows: Vec<Row>) -> Report {

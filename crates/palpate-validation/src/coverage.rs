@@ -107,6 +107,6 @@ impl Coverage {
     /// The greatest force of an estimate, which has no standard error.
     fn greatest(&self) -> Option<Figure> {
         let is_detected = !self.error_mm.is_empty();
-        is_detected.then_some(Figure { value: self.greatest_n, standard_error: 0.0 })
+        is_detected.then_some(Figure::exact(self.greatest_n))
     }
 }

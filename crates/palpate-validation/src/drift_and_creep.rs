@@ -25,9 +25,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 const RIG: &str = include_str!("../../../examples/noisy-beam.toml");
 /// Distinguishes the seeds of contacts from those of calibrations.
-const USE: u64 = 1000;
-const FORCE_N: f64 = 3.0;
-const NOISE_M: f64 = 5e-6;
+const CONTACT_SEEDS: u64 = 1000;
 const RATE_HZ: f64 = 100.0;
 /// Untouched readings of the tare.
 const TARE: usize = 100;
@@ -63,11 +61,11 @@ enum State {
 #[derive(Clone, Copy, Debug)]
 struct Durations {
     before_s: f64,
-    held_s: f64,
+    contact_s: f64,
     after_s: f64,
 }
 
-const MINUTES: Durations = Durations { before_s: 30.0, held_s: 60.0, after_s: 30.0 };
+const MINUTES: Durations = Durations { before_s: 30.0, contact_s: 60.0, after_s: 30.0 };
 
 #[derive(Clone, Copy, Debug)]
 struct Case {
@@ -105,11 +103,11 @@ impl Fault {
         matches!(self, Self::Creep | Self::LineAndCreep)
     }
 
-    fn imperfections(self) -> Imperfections {
+    fn imperfections(self, noise_sd: f64) -> Imperfections {
         let mut drift = OffsetDrift::default();
         match self {
-            Self::Line | Self::LineAndCreep => drift.line_per_s = Amount::Value(0.02 * NOISE_M),
-            Self::Walk => drift.walk_per_root_s = Amount::Value(0.1 * NOISE_M),
+            Self::Line | Self::LineAndCreep => drift.line_per_s = Amount::Value(0.02 * noise_sd),
+            Self::Walk => drift.walk_per_root_s = Amount::Value(0.1 * noise_sd),
             Self::None | Self::Creep => {}
         }
         let creep = if self.creeps() { CREEP } else { Relaxation::default() };
@@ -146,8 +144,8 @@ impl State {
 /// Tared readings of one contact.
 struct Readings {
     contact: Contact,
-    /// Of the contact.
-    held: std::ops::Range<usize>,
+    /// Numbers of the readings of the contact.
+    pressed: std::ops::Range<usize>,
     tared: Vec<Vec<f64>>,
 }
 
@@ -168,8 +166,8 @@ impl Case {
             (EXPERIMENT.seed..EXPERIMENT.seed + calibrations).zip(PLACES_MM.iter().cycle())
         {
             let locator = self.calibrated(&rig, seed)?;
-            let contact = Contact { position: Position::along(mm(*place_mm)), force_n: FORCE_N };
-            let readings = self.readings(&rig.setup, &locator, contact, USE + seed)?;
+            let contact = Contact { position: Position::along(mm(*place_mm)), force_n: force_n(&rig)? };
+            let readings = self.readings(&rig.setup, &locator, contact, CONTACT_SEEDS + seed)?;
             for (state, tally) in states.iter().zip(&mut tallies) {
                 tally.add(seed, &track(&locator, state.config(), &readings)?);
             }
@@ -187,21 +185,22 @@ impl Case {
             let share = 1.0 - CREEP.share * (-PRESSED_S / CREEP.time_s).exp();
             recording.rows.iter_mut().flat_map(|row| &mut row.reading).for_each(|value| *value *= share);
         }
-        let setup = rig.setup.clone().with_force(self.is_known.then_some(FORCE_N))?;
+        let setup = rig.setup.clone().with_force(rig.setup.force_n().filter(|_| self.is_known))?;
         Ok(rig.estimator.fit_task(FitTask::new(&setup, &recording))?)
     }
 
     fn readings(&self, setup: &Setup, locator: &Locator, contact: Contact, seed: u64) -> Result<Readings> {
         let bench = SimulatedBench::perfect_watched(setup, seed, Watch::NONE)?;
-        let mut bench = bench.with_imperfections(self.fault.imperfections(), FORCE_N);
-        let Durations { before_s, held_s, after_s } = self.durations;
+        let noise_sd = setup.layout().sensors()[0].channel.noise_sd;
+        let mut bench = bench.with_imperfections(self.fault.imperfections(noise_sd), contact.force_n);
+        let Durations { before_s, contact_s, after_s } = self.durations;
         let number = |time_s: f64| (time_s * RATE_HZ).round() as usize;
-        let held = number(before_s)..number(before_s + held_s);
+        let pressed = number(before_s)..number(before_s + contact_s);
         let (untouched, touched) = (bench.clean(&[]), bench.clean(&[contact]));
         let mut tare = locator.tare()?;
         let mut tared = Vec::new();
-        for i in 0..number(before_s + held_s + after_s) {
-            let clean = if held.contains(&i) { &touched } else { &untouched };
+        for i in 0..number(before_s + contact_s + after_s) {
+            let clean = if pressed.contains(&i) { &touched } else { &untouched };
             let values = bench.advance(clean, 1.0 / RATE_HZ);
             let mut reading = bench.measure(&values);
             if i < TARE {
@@ -212,8 +211,12 @@ impl Case {
             tare.apply(&raw, &mut reading)?;
             tared.push(reading);
         }
-        Ok(Readings { contact, held: held.start - TARE..held.end - TARE, tared })
+        Ok(Readings { contact, pressed: pressed.start - TARE..pressed.end - TARE, tared })
     }
+}
+
+fn force_n(rig: &Rig) -> Result<f64> {
+    rig.setup.force_n().context("examples/noisy-beam.toml has a known force")
 }
 
 /// Figures of one contact.
@@ -226,10 +229,10 @@ struct Outcome {
 }
 
 fn track(locator: &Locator, config: TrackerConfig, readings: &Readings) -> Result<Outcome> {
-    let Readings { contact: truth, held, tared } = readings;
+    let Readings { contact: truth, pressed, tared } = readings;
     let tracking = locator.tracking(&config)?;
     let mut tracker = Tracker::new(tracking.likelihood(), config);
-    let counted = held.start + (ONSET_S * RATE_HZ) as usize..held.end;
+    let counted = pressed.start + (ONSET_S * RATE_HZ) as usize..pressed.end;
     let (mut tracked, mut located, mut covered, mut error_mm) = (0, 0, 0, 0.0);
     let mut released = tared.len();
     for (i, reading) in tared.iter().enumerate() {
@@ -242,7 +245,7 @@ fn track(locator: &Locator, config: TrackerConfig, readings: &Readings) -> Resul
             error_mm += 1e3 * (first.x_m - x_m).abs();
             covered += usize::from((first.x_95_m.0..=first.x_95_m.1).contains(&x_m));
         }
-        if i >= held.end && first.is_none() {
+        if i >= pressed.end && first.is_none() {
             released = released.min(i);
         }
     }
@@ -251,7 +254,7 @@ fn track(locator: &Locator, config: TrackerConfig, readings: &Readings) -> Resul
         error_mm: of_tracked(error_mm),
         covered_percent: of_tracked(100.0 * covered as f64),
         located_percent: 100.0 * located as f64 / counted.len() as f64,
-        release_s: (released - held.end) as f64 / RATE_HZ,
+        release_s: (released - pressed.end) as f64 / RATE_HZ,
     })
 }
 
@@ -296,7 +299,7 @@ mod tests {
 
     #[test]
     fn creep_in_the_state_takes_creep_off_the_error() {
-        let durations = Durations { before_s: 5.0, held_s: 15.0, after_s: 5.0 };
+        let durations = Durations { before_s: 5.0, contact_s: 15.0, after_s: 5.0 };
         let case = Case { is_known: true, fault: Fault::Creep, durations };
         let rows = case.rows(1).unwrap();
         let error_mm = |row: &Row| row.figures[0].unwrap().value;

@@ -3,18 +3,20 @@
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::statistics::Share;
+use crate::surfaces::{paper_beam, square_plate};
 use crate::table::{Column, Figure, Goal, Row, Table};
 use anyhow::{Context, Result};
 use palpate::estimators::digit::DigitTheory;
 use palpate::estimators::simulate::CleanSensors;
-use palpate::estimators::status::FalseAlarmRate;
+use palpate::estimators::status::{FalseAlarmRate, LINE_PLACES};
 use palpate::mechanics::sensing::{ChannelErrors, measure};
 use palpate::mechanics::surface::ForceDirection;
 use palpate::numerics::{bisect, chi_squared_critical_value, normal_cdf};
 use palpate::prelude::{
-    Beam, ClosedForm, Contact, CramerRaoBound, Deflection, Digit, DigitEstimator, Estimator, Extent, Fit,
-    FitTask, Influence, Plate, Position, Setup, Status, Strain, Training, gpa, microstrain, mm, newtons, um,
+    ClosedForm, Contact, CramerRaoBound, Digit, DigitEstimator, Estimator, Extent, Fit, FitTask, Influence,
+    Position, Setup, Status, Strain, Training, gpa, microstrain, mm, newtons, um,
 };
+use palpate_testing::random_field::curvatures;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
@@ -31,8 +33,6 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 /// Presses at each place.
 const REPEATS: usize = 1000;
-/// Places along a line in the cost of a contact.
-const LINE_PLACES: f64 = 33.0;
 /// Positions along each side in the Euler characteristic.
 const SIDE: usize = 60;
 
@@ -77,10 +77,7 @@ fn run(size: Size, progress: Progress) -> Result<Vec<Table>> {
 }
 
 fn benches() -> Result<[Bench; 4]> {
-    let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-    let beam = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
-    let plate = Plate::simply_supported((mm(300.0), mm(300.0)), mm(0.8), gpa(200.0), 0.3)?;
-    let plate = Setup::new(plate).sensors(Deflection.grid(3, 3).noise(um(5.0)))?;
+    let (beam, plate) = (paper_beam(um(5.0))?, square_plate(um(5.0))?);
     let digit = Digit::new(mm(120.0), mm(10.0), mm(0.5), gpa(200.0))?.with_direction(ForceDirection::Normal);
     let gauges = Strain.at_x([4.0, 20.0, 40.0, 60.0, 80.0].map(mm)).noise(microstrain(1.0));
     let digit = Setup::new(digit).sensors(gauges)?;
@@ -124,12 +121,13 @@ impl Case<'_> {
         let bound = explanation_bound(&setup, &limit);
         let per_thousand = |share: Share| {
             let percent = share.percent()?;
-            Some(Figure { value: 10.0 * percent.value, standard_error: 10.0 * percent.standard_error })
+            let standard_error = percent.standard_error.map(|error| 10.0 * error);
+            Some(Figure { value: 10.0 * percent.value, standard_error })
         };
         let figures = vec![
             per_thousand(beyond_noise),
             per_thousand(like_contact),
-            Some(Figure { value: 1e3 * bound, standard_error: 0.0 }),
+            Some(Figure::exact(1e3 * bound)),
             per_thousand(detected),
             per_thousand(outside_model),
         ];
@@ -178,45 +176,24 @@ fn anywhere(extent: Extent, rng: &mut Xoshiro256PlusPlus) -> Position {
 
 /// Bound on the probability that a contact explains noise.
 ///
-/// A contact has the cost k·ln n + 2·ln 33 of the extended Bayesian information criterion, for k unknowns and n channels, and u has half the tail Φ(−√cost). Noise exceeds u along the unit
+/// A contact has the cost k·ln n + 2·ln m of the extended Bayesian information criterion, for k unknowns, n channels and m places, and u has half the tail Φ(−√cost). Noise exceeds u along the unit
 /// reading of some contact with the expected Euler characteristic Φ(−u) + (L₁/2π + L₂·u/(2π)^(3/2))·e^(−u²/2) (Adler and Taylor, *Random Fields and Geometry*, 2007, section 12.4). L₁ is the
 /// length of the curve of unit readings on a line, and half the boundary length on a plane; L₂ is their area (0 on a line).
 fn explanation_bound(setup: &Setup, limit: &CramerRaoBound) -> f64 {
     let extent = setup.surface().extent();
     let rows = if extent.width_m().is_some() { SIDE } else { 1 };
     let unknowns = 1 + usize::from(rows > 1) + usize::from(setup.force_n().is_none());
-    let cost = unknowns as f64 * (setup.layout().len() as f64).ln() + 2.0 * LINE_PLACES.ln();
+    let cost = unknowns as f64 * (setup.layout().len() as f64).ln() + 2.0 * (LINE_PLACES as f64).ln();
     let tail = 0.5 * normal_cdf(-cost.sqrt());
     let u = bisect((0.0, 20.0), 40, |u| normal_cdf(-u) > tail);
-    let unit_reading = |column: usize, row: usize| {
+    let reading = |row: usize, column: usize| {
         let share = |i: usize| (i as f64 + 0.5) / SIDE as f64;
         let y_m = extent.width_m().map_or(0.0, |width_m| share(row) * width_m);
         let position = Position { x_m: share(column) * extent.length_m(), y_m };
-        let whitened = limit.whitened_reading(Contact { position, force_n: 1e-3 });
-        let length = dot(&whitened, &whitened).sqrt();
-        whitened.into_iter().map(|value| value / length).collect::<Vec<f64>>()
+        limit.whitened_reading(Contact { position, force_n: 1e-3 })
     };
-    let grid: Vec<Vec<Vec<f64>>> =
-        (0..rows).map(|row| (0..SIDE).map(|column| unit_reading(column, row)).collect()).collect();
-    let step = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| b - a).collect() };
-    // The maximum of NaN and 0 is 0: steps from zero readings have no length.
-    let distance = |a: &[f64], b: &[f64]| dot(&step(a, b), &step(a, b)).sqrt().max(0.0);
-    let along = |row: usize| grid[row].windows(2).map(|pair| distance(&pair[0], &pair[1])).sum::<f64>();
-    let across =
-        |column: usize| grid.windows(2).map(|pair| distance(&pair[0][column], &pair[1][column])).sum::<f64>();
-    let half = 0.5 * (along(0) + along(rows - 1) + across(0) + across(SIDE - 1));
-    let parallelogram = |row: usize, column: usize| {
-        let here = &grid[row][column];
-        let (a, b) = (step(here, &grid[row][column + 1]), step(here, &grid[row + 1][column]));
-        (dot(&a, &a) * dot(&b, &b) - dot(&a, &b).powi(2)).sqrt().max(0.0)
-    };
-    let cells = (1..rows).flat_map(|row| (1..SIDE).map(move |column| (row - 1, column - 1)));
-    let area: f64 = cells.map(|(row, column)| parallelogram(row, column)).sum();
+    let [half, area] = curvatures(rows, SIDE, reading);
     normal_cdf(-u) + (half / TAU + area * u / TAU.powf(1.5)) * (-0.5 * u * u).exp()
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

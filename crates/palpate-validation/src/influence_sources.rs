@@ -3,15 +3,14 @@
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::statistics::{Ratio, Sample, Share};
+use crate::surfaces::paper_beam_with;
 use crate::table::{Column, Goal, Row, Table};
 use anyhow::{Result, ensure};
 use palpate::estimators::influence::InfluenceSource;
 use palpate::estimators::simulate::SimulatedBench;
 use palpate::mechanics::limit::Force;
 use palpate::mechanics::sensing::ChannelModel;
-use palpate::prelude::{
-    Beam, Contact, Deflection, FitTask, Influence, Locate, Position, Setup, Training, gpa, mm, newtons, um,
-};
+use palpate::prelude::{Contact, FitTask, Influence, Locate, Position, Setup, Training, mm, newtons, um};
 
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -77,9 +76,7 @@ fn run(size: Size, progress: Progress) -> Result<Vec<Table>> {
 
 /// The founding paper's bench with a known force.
 fn paper(channel: ChannelModel) -> Result<Setup> {
-    let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-    let setup = Setup::new(beam).sensors(Deflection.evenly(8).channel(channel))?;
-    Ok(setup.known_force(newtons(FORCE_N))?)
+    Ok(paper_beam_with(channel)?.known_force(newtons(FORCE_N))?)
 }
 
 fn contact(x_m: f64) -> Contact {

@@ -28,6 +28,7 @@ pub mod report;
 mod statistics;
 mod statuses;
 mod strips;
+mod surfaces;
 pub mod table;
 mod tally;
 mod weighed;

@@ -3,11 +3,12 @@
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::statistics::{Sample, Share};
+use crate::surfaces::paper_beam;
 use crate::table::{Column, Goal, Row, Table};
 use anyhow::{Context, Result};
 use palpate::estimators::estimator::{LoadProfile, patch_limits};
-use palpate::prelude::{Beam, Deflection, Profiler, Setup, Strain, UniformLoad, simulate_loads};
-use palpate::prelude::{gpa, microstrain, mm, um};
+use palpate::prelude::{Profiler, Setup, Strain, UniformLoad, simulate_loads};
+use palpate::prelude::{microstrain, mm, um};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -24,8 +25,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 const BEAM_M: f64 = 0.4;
 
 fn setup(deflection_um: f64, has_strain: bool) -> Result<Setup> {
-    let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-    let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(deflection_um)))?;
+    let setup = paper_beam(um(deflection_um))?;
     Ok(if has_strain { setup.sensors(Strain.evenly(8).noise(microstrain(0.5)))? } else { setup })
 }
 

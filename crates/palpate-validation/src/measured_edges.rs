@@ -4,13 +4,14 @@ use crate::coverage::Coverage;
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::raw_bench::{Influences, RawBench};
+use crate::surfaces::paper_beam;
 use crate::table::{Row, Table};
 use anyhow::{Context, Result};
 use palpate::estimators::influence::{InfluenceLocator, Structure};
 use palpate::estimators::simulate::CleanSensors;
 use palpate::mechanics::sensing::SensorKind;
 use palpate::mechanics::surface::Surface;
-use palpate::prelude::{Beam, Contact, Deflection, Extent, Locate, Plate, Position, Setup, gpa, mm, um};
+use palpate::prelude::{Contact, Extent, Locate, Plate, Position, gpa, mm, um};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::sync::Arc;
@@ -120,8 +121,7 @@ impl BeamCase {
     }
 
     fn bench(&self, seed: u64) -> Result<RawBench> {
-        let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-        let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
+        let setup = paper_beam(um(5.0))?;
         let influences: Influences = Box::new(move |position| {
             let contact = Contact { position, force_n: 1.0 };
             let model = setup.surface().model();

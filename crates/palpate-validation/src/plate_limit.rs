@@ -123,7 +123,7 @@ impl Case {
         }
         let force = if is_known { "known" } else { "unknown" };
         let row = |((ratio, covered, touches), (.., range)): (&(Ratio, Share, u32), (_, _, &str))| {
-            let count = Figure { value: f64::from(*touches), standard_error: 0.0 };
+            let count = Figure::exact(f64::from(*touches));
             Row::new(&[self.source.1, force, range], vec![ratio.figure(), covered.percent(), Some(count)])
         };
         Ok(sums.iter().zip(RANGES).map(row).collect())

@@ -50,7 +50,7 @@ impl Report {
         let Self { title, method, command, palpate, seed, machine, .. } = self;
         let tables: Vec<String> = self.tables.iter().map(Table::markdown).collect();
         format!(
-            "# {title}\n\n{method}\n\n`{command}`: palpate {palpate}, seeds from {seed} on; {machine}. [README.md](README.md) says how to read the tables.\n\n{}",
+            "# {title}\n\n{method}\n\n`{command}`: palpate {palpate}, seeds from {seed} on; {machine}. [How to read a table](README.md#how-to-read-a-table).\n\n{}",
             tables.join("\n")
         )
     }
@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn files_round_trip() {
         let mut table = Table::new("Contacts.", &["place"], vec![Column::percent("covered", Goal::COVERAGE)]);
-        let figure = Figure { value: 95.123_456_789, standard_error: 0.1 + 0.2 };
+        let figure = Figure { value: 95.123_456_789, standard_error: Some(0.1 + 0.2) };
         table.rows.push(Row::new(&["3 mm"], vec![Some(figure)]));
         let report = Report::for_test("strip", Size::Quick, vec![table]);
         let folder = tempfile::tempdir().unwrap();

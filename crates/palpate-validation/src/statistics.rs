@@ -29,16 +29,16 @@ impl Sample {
         self.clusters.values().flatten().copied()
     }
 
-    /// Mean x̄ of n values. Its standard error is the larger of s/√n and, over G clusters of nᵢ values with the sums sᵢ,
+    /// Mean x̄ of n values. The standard error is the larger of s/√n and, over G clusters of nᵢ values with the sums sᵢ,
     /// √(G/(G − 1)·Σ(sᵢ − x̄·nᵢ)²)/n.
     pub fn mean(&self) -> Option<Figure> {
         let mean = self.values().sum::<f64>() / self.len() as f64;
         let squares: f64 = self.values().map(|value| (value - mean).powi(2)).sum();
         let independent = (squares / (self.len() as f64 - 1.0).max(1.0) / self.len() as f64).sqrt();
-        self.figure(mean, independent.max(self.clustered_error(mean)))
+        self.figure(mean, self.error_of_several(independent.max(self.clustered_error(mean))))
     }
 
-    /// Median. Its standard error is the larger of half the distance between the order statistics n/2 ± √n/2, and the standard error of the mean of
+    /// Median. The standard error is the larger of half the distance between the order statistics n/2 ± √n/2, and the standard error of the mean of
     /// the clusters' medians.
     pub fn median(&self) -> Option<Figure> {
         let sorted = sorted(self.values());
@@ -59,7 +59,7 @@ impl Sample {
                 (squares / (count as f64 - 1.0) / count as f64).sqrt()
             }
         };
-        self.figure(median, (0.5 * (high - low)).max(between))
+        self.figure(median, self.error_of_several((0.5 * (high - low)).max(between)))
     }
 
     fn clustered_error(&self, mean: f64) -> f64 {
@@ -72,8 +72,13 @@ impl Sample {
         (count / (count - 1.0) * squares).sqrt() / self.len() as f64
     }
 
-    fn figure(&self, value: f64, standard_error: f64) -> Option<Figure> {
-        let is_finite = value.is_finite() && standard_error.is_finite();
+    /// One value has no standard error.
+    fn error_of_several(&self, standard_error: f64) -> Option<f64> {
+        (self.len() > 1).then_some(standard_error)
+    }
+
+    fn figure(&self, value: f64, standard_error: Option<f64>) -> Option<Figure> {
+        let is_finite = value.is_finite() && standard_error.is_none_or(f64::is_finite);
         (!self.is_empty() && is_finite).then_some(Figure { value, standard_error })
     }
 }
@@ -103,14 +108,14 @@ impl Share {
         self.0.add(calibration, f64::from(u8::from(has_property)));
     }
 
-    /// Share k/n in %. Its standard error is the larger of that by clusters and √(p̃(1 − p̃)/n) with p̃ = (k + ½)/(n + 1), which is positive for k = 0
+    /// Share k/n in %. The standard error is the larger of that by clusters and √(p̃(1 − p̃)/n) with p̃ = (k + ½)/(n + 1), which is positive for k = 0
     /// and k = n too.
     pub fn percent(&self) -> Option<Figure> {
         let (count, cases) = (self.0.values().sum::<f64>(), self.0.len() as f64);
         let smoothed = (count + 0.5) / (cases + 1.0);
         let independent = (smoothed * (1.0 - smoothed) / cases).sqrt();
         let share = count / cases;
-        self.0.figure(100.0 * share, 100.0 * independent.max(self.0.clustered_error(share)))
+        self.0.figure(100.0 * share, Some(100.0 * independent.max(self.0.clustered_error(share))))
     }
 }
 
@@ -126,7 +131,7 @@ impl Ratio {
         self.clusters.entry(calibration).or_default().push([numerator, denominator]);
     }
 
-    /// Ratio R = Σa/Σb. Its standard error is that of the sum of the residuals a − R·b, by the delta method, divided by Σb.
+    /// Ratio R = Σa/Σb. The standard error is that of the sum of the residuals a − R·b, by the delta method, divided by Σb.
     pub fn figure(&self) -> Option<Figure> {
         let pairs = || self.clusters.values().flatten();
         let [numerator, denominator] = pairs().fold([0.0; 2], |[a, b], pair| [a + pair[0], b + pair[1]]);
@@ -136,8 +141,8 @@ impl Ratio {
             pairs.iter().for_each(|[a, b]| residuals.add(*calibration, a - value * b));
         }
         let mean = residuals.mean()?;
-        let standard_error = mean.standard_error * residuals.len() as f64 / denominator;
-        (value.is_finite() && standard_error.is_finite()).then_some(Figure { value, standard_error })
+        let standard_error = mean.standard_error.map(|error| error * residuals.len() as f64 / denominator);
+        value.is_finite().then_some(Figure { value, standard_error })
     }
 }
 
@@ -151,7 +156,7 @@ mod tests {
         assert_eq!(ratio.figure(), None);
         (1..=20).for_each(|i| ratio.add(i % 4, 2.0 * i as f64, i as f64));
         let exact = ratio.figure().unwrap();
-        assert!((exact.value - 2.0).abs() < 1e-12 && exact.standard_error < 1e-12, "{exact:?}");
+        assert!((exact.value - 2.0).abs() < 1e-12 && exact.standard_error.unwrap() < 1e-12, "{exact:?}");
         // With equal denominators the error is that of the mean of the numerators.
         let (mut ratio, mut sample) = (Ratio::default(), Sample::default());
         for i in 0..30_u64 {
@@ -160,7 +165,7 @@ mod tests {
             sample.add(i % 5, value);
         }
         let (ratio, mean) = (ratio.figure().unwrap(), sample.mean().unwrap());
-        assert!((4.0 * ratio.standard_error - mean.standard_error).abs() < 1e-12);
+        assert!((4.0 * ratio.standard_error.unwrap() - mean.standard_error.unwrap()).abs() < 1e-12);
     }
 
     fn sample(clusters: &[&[f64]]) -> Sample {
@@ -176,10 +181,10 @@ mod tests {
         let alone = sample(&[&[1.0], &[2.0], &[3.0], &[4.0]]).mean().unwrap();
         assert_eq!(alone.value, 2.5);
         // s² = 5/3.
-        assert!((alone.standard_error - (5.0_f64 / 12.0).sqrt()).abs() < 1e-12);
+        assert!((alone.standard_error.unwrap() - (5.0_f64 / 12.0).sqrt()).abs() < 1e-12);
         // Values that agree within their calibrations count as one each.
         let clustered = sample(&[&[1.0; 50], &[3.0; 50]]).mean().unwrap();
-        assert!((clustered.standard_error - 1.0).abs() < 1e-12, "{clustered:?}");
+        assert!((clustered.standard_error.unwrap() - 1.0).abs() < 1e-12, "{clustered:?}");
     }
 
     #[test]
@@ -188,11 +193,14 @@ mod tests {
         let quantile = |i: usize| ((i as f64 + 0.5) / 400.0, ()).0;
         let values: Vec<f64> = (0..400).map(|i| (quantile(i) / (1.0 - quantile(i))).ln()).collect();
         let median = sample(&[&values]).median().unwrap();
-        assert!(median.value.abs() < 1e-9 && (median.standard_error / 0.1 - 1.0).abs() < 0.1, "{median:?}");
+        assert!(
+            median.value.abs() < 1e-9 && (median.standard_error.unwrap() / 0.1 - 1.0).abs() < 0.1,
+            "{median:?}"
+        );
         assert_eq!(sample(&[&[1.0, f64::INFINITY]]).median(), None);
         assert_eq!(Sample::default().median(), None);
-        // One value has no order statistics around it.
-        assert_eq!(sample(&[&[3.0]]).median(), Some(Figure { value: 3.0, standard_error: 0.0 }));
+        assert_eq!(sample(&[&[3.0]]).median(), Some(Figure::exact(3.0)));
+        assert_eq!(sample(&[&[3.0]]).mean(), Some(Figure::exact(3.0)));
     }
 
     #[test]
@@ -201,6 +209,6 @@ mod tests {
         assert_eq!(share.percent(), None);
         (0..20).for_each(|_| share.add(0, true));
         let full = share.percent().unwrap();
-        assert!(full.value == 100.0 && (2.0..5.0).contains(&full.standard_error), "{full:?}");
+        assert!(full.value == 100.0 && (2.0..5.0).contains(&full.standard_error.unwrap()), "{full:?}");
     }
 }

@@ -3,16 +3,17 @@
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::statistics::{Sample, Share};
+use crate::surfaces::{paper_beam, square_plate};
 use crate::table::{Column, Figure, Goal, Row, Table};
 use anyhow::{Context, Result};
 use palpate::estimators::estimator::contenders;
 use palpate::estimators::influence::Structure;
 use palpate::estimators::simulate::CleanSensors;
 use palpate::mechanics::sensing::{Layout, SensorKind};
-use palpate::numerics::normal_cdf;
+use palpate::numerics::{NORMAL_99, normal_cdf};
 use palpate::prelude::{
-    Beam, Contact, Deflection, Estimate, Estimator, Extent, Fit, Influence, Locator, Network, Plate,
-    Position, Recording, Setup, Status, Training, gpa, mm, newtons, um,
+    Contact, Estimate, Estimator, Extent, Fit, Influence, Locator, Network, Position, Recording, Setup,
+    Status, Training, newtons,
 };
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -200,10 +201,7 @@ struct Bench {
 
 /// The benches.
 fn benches() -> Result<[Bench; 5]> {
-    let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-    let beam = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
-    let plate = Plate::simply_supported((mm(300.0), mm(300.0)), mm(0.8), gpa(200.0), 0.3)?;
-    let plate = Setup::new(plate).sensors(Deflection.grid(3, 3).noise(um(5.0)))?;
+    let (beam, plate) = (paper_beam(NOISE_M)?, square_plate(NOISE_M)?);
     let extent = beam.surface().extent();
     let raw = Layout::even(SensorKind::Raw, beam.layout().len(), extent.length_m());
     let raw = Setup::new(extent).with_layout(raw)?;
@@ -347,7 +345,6 @@ impl Bench {
     ///
     /// The lemma of Neyman and Pearson gives the power Φ(√λ − 2.576) for the least squared distance λ, over the noise, between the reading of the two contacts and that of one contact.
     fn greatest_power(&self, pairs: usize) -> Result<Option<Figure>> {
-        const QUANTILE: f64 = 2.576;
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
         let (sensors, extent) = (self.clean_sensors()?, self.physics.surface().extent());
         let influence = |position| sensors.reading(Contact { position, force_n: 1.0 });
@@ -367,7 +364,7 @@ impl Bench {
             let of_nodes = nodes.iter().map(|(position, influence)| (distance(influence), *position));
             let first = of_nodes.min_by(|a, b| a.0.total_cmp(&b.0)).context("a surface has nodes")?;
             let least = descend(extent, first, |position| distance(&influence(position)));
-            powers.add(0, 100.0 * normal_cdf(least.sqrt() - QUANTILE));
+            powers.add(0, 100.0 * normal_cdf(least.sqrt() - NORMAL_99));
         }
         Ok(powers.mean())
     }

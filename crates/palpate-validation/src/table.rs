@@ -7,8 +7,24 @@ use serde::{Deserialize, Serialize};
 pub struct Figure {
     /// Value, in the unit of its column.
     pub value: f64,
-    /// Standard error, in the same unit.
-    pub standard_error: f64,
+    /// Standard error, in the same unit; `None` for an exact value, an extreme, or a mean of one value.
+    pub standard_error: Option<f64>,
+}
+
+impl Figure {
+    /// A figure without a standard error.
+    pub const fn exact(value: f64) -> Self {
+        Self { value, standard_error: None }
+    }
+
+    /// The value, with ± and its standard error if it has one.
+    pub fn text(self, decimals: usize) -> String {
+        let Self { value, standard_error } = self;
+        match standard_error {
+            Some(error) => format!("{value:.decimals$} ± {error:.decimals$}"),
+            None => format!("{value:.decimals$}"),
+        }
+    }
 }
 
 /// Direction in which a figure is better.
@@ -117,10 +133,7 @@ impl Table {
         for row in &self.rows {
             let figures = row.figures.iter().zip(&self.columns).map(|(figure, column)| match figure {
                 None => "–".to_owned(),
-                Some(Figure { value, standard_error }) => {
-                    let decimals = column.decimals;
-                    format!("{value:.decimals$} ± {standard_error:.decimals$}")
-                }
+                Some(figure) => figure.text(column.decimals),
             });
             let mut cells: Vec<String> = row.labels.iter().cloned().chain(figures).collect();
             if let (Some(failure), Some(first)) = (&row.failure, cells.get_mut(row.labels.len())) {
@@ -145,7 +158,7 @@ mod tests {
     fn markdown_has_figures_with_errors_and_failures_with_reasons() {
         let columns = vec![Column::percent("covered", Goal::COVERAGE), Column::mm("error", Goal::Smaller)];
         let mut table = Table::new("Contacts.", &["place"], columns);
-        let figure = |value, standard_error| Some(Figure { value, standard_error });
+        let figure = |value, error| Some(Figure { value, standard_error: Some(error) });
         table.rows.push(Row::new(&["3 mm"], vec![figure(95.04, 0.31), None]));
         let failure = Some("no | presses".to_owned());
         table.rows.push(Row { failure, ..Row::new(&["9 mm"], vec![None, None]) });

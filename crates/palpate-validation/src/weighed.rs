@@ -3,12 +3,12 @@
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::statistics::{Sample, Share};
+use crate::surfaces::paper_beam;
 use crate::table::{Column, Goal, Row as TableRow, Table};
 use anyhow::{Context, Result};
 use palpate::estimators::simulate::clean_reading;
 use palpate::prelude::{
-    Beam, Contact, Deflection, Fit, FitTask, Influence, Locate, Position, Recording, Row, Setup, Status, gpa,
-    mm, newtons, um,
+    Contact, Fit, FitTask, Influence, Locate, Position, Recording, Row, Setup, Status, mm, newtons, um,
 };
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -50,8 +50,7 @@ fn name((places, times, _): (usize, usize, f64)) -> String {
 
 fn rows(case: (usize, usize, f64), readings: u64) -> Result<Vec<TableRow>> {
     let (places, times, from_mm) = case;
-    let beam = Setup::new(Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?)
-        .sensors(Deflection.evenly(8).noise(um(5.0)))?;
+    let beam = paper_beam(um(5.0))?;
     let setup = Setup::measured(mm(400.0), &["a", "b", "c", "d", "e", "f", "g", "h"])?;
     let setup = setup.known_force(newtons(3.0))?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(EXPERIMENT.seed);

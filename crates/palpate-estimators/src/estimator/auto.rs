@@ -249,7 +249,11 @@ pub(super) fn compared_rows<'a>(candidates: &[Estimator], recording: &'a Recordi
 
 /// Least geometric mean of error and interval score, or the simplest structure not significantly worse. Drift
 /// is subtracted, as by a tare.
-fn choose(task: FitTask, candidates: Vec<Estimator>, limit: Option<TimeLimit>) -> Result<Choice, FitError> {
+fn choose(
+    task: FitTask,
+    mut candidates: Vec<Estimator>,
+    limit: Option<TimeLimit>,
+) -> Result<Choice, FitError> {
     if candidates.is_empty() {
         return Err(FitError::NoCandidate);
     }
@@ -284,7 +288,6 @@ fn choose(task: FitTask, candidates: Vec<Estimator>, limit: Option<TimeLimit>) -
         }
     };
     let (mut tried, mut left_out, mut last) = (Vec::new(), Vec::new(), None);
-    let mut candidates = candidates;
     if let Some(saturating) = candidates.iter().position(is_saturating) {
         match is_unsaturated(whole) {
             Ok(true) => left_out.push((candidates.remove(saturating).name(), UNSATURATED.to_owned())),

@@ -18,6 +18,7 @@ use palpate_mechanics::sensing::SensorKind::Deflection;
 use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, measure};
 use palpate_mechanics::surface::ForceDirection;
 use palpate_numerics::normal_cdf;
+use palpate_testing::random_field::curvatures;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -157,31 +158,13 @@ fn chance_of_contact(setup: &Setup, cost: f64) -> f64 {
     let clean = CleanSensors::new(setup.surface().model().unwrap(), setup.layout());
     let extent = setup.surface().extent();
     let rows = if extent.width_m().is_some() { SIDE } else { 1 };
-    // The direction of a zero reading is NaN, and adds 0 to the lengths below.
-    let direction = |column: usize, row: usize| {
+    let reading = |row: usize, column: usize| {
         let share = |i: usize| (i as f64 + 0.5) / SIDE as f64;
         let y_m = extent.width_m().map_or(0.0, |width_m| share(row) * width_m);
         let position = Position { x_m: share(column) * extent.length_m(), y_m };
-        let whitened = whitened(setup, &clean.reading(Contact { position, force_n: 1e-3 }));
-        let length = whitened.dot(&whitened).sqrt();
-        whitened / length
+        whitened(setup, &clean.reading(Contact { position, force_n: 1e-3 })).to_vec()
     };
-    let grid: Vec<Vec<Array1<f64>>> =
-        (0..rows).map(|row| (0..SIDE).map(|column| direction(column, row)).collect()).collect();
-    let distance = |a: &Array1<f64>, b: &Array1<f64>| (b - a).dot(&(b - a)).sqrt().max(0.0);
-    let along = |row: usize| grid[row].windows(2).map(|pair| distance(&pair[0], &pair[1])).sum::<f64>();
-    let across =
-        |column: usize| grid.windows(2).map(|pair| distance(&pair[0][column], &pair[1][column])).sum::<f64>();
-    let half = 0.5 * (along(0) + along(rows - 1) + across(0) + across(SIDE - 1));
-    let parallelogram = |row: usize, column: usize| {
-        let here = &grid[row][column];
-        let (a, b) = (&grid[row][column + 1] - here, &grid[row + 1][column] - here);
-        (a.dot(&a) * b.dot(&b) - a.dot(&b).powi(2)).sqrt().max(0.0)
-    };
-    let area: f64 = (1..rows)
-        .flat_map(|row| (1..SIDE).map(move |column| (row - 1, column - 1)))
-        .map(|(row, column)| parallelogram(row, column))
-        .sum();
+    let [half, area] = curvatures(rows, SIDE, reading);
     let u = cost.sqrt();
     normal_cdf(-u) + (half / TAU + area * u / TAU.powf(1.5)) * (-0.5 * cost).exp()
 }
