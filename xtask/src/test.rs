@@ -20,6 +20,9 @@ use crate::tidy;
 /// The build and the Python tests share these targets, so that cargo compiles once.
 const TARGETS: [&str; 3] = ["--lib", "--tests", "--bin=palpate"];
 
+/// xtask shares `syn` with procedural macros. Beside it cargo compiles them, and all that depends on them, with other flags than clippy and the doc tests do.
+const WITHOUT_XTASK: [&str; 2] = ["--exclude", "xtask"];
+
 struct Step {
     name: &'static str,
     succeeded: bool,
@@ -32,7 +35,8 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
     let mut missing = Vec::new();
     let [workspace, with, features] = features::all_but_slow(root)?;
     let everything = [workspace.as_str(), &with, &features];
-    let tested = [&everything[..], &TARGETS].concat();
+    let product = [&everything[..], &WITHOUT_XTASK].concat();
+    let tested = [&product[..], &TARGETS].concat();
     let prerequisites = step("prerequisites", || prerequisites(root, skips, &mut missing))?;
     // Built while the compiler does not use all cores; the server contains the dashboard.
     let environment = python::make_environment(root);
@@ -52,10 +56,11 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
             let (succeeded, counts) = shown(root, &[&["build"], &tested[..]].concat())?;
             Ok((has_dashboard && succeeded, counts))
         })?,
-        step("tests", || tests(root, skips, &skipped, &everything))?,
+        step("tests", || tests(root, skips, &skipped, &product))?,
+        step("xtask tests", || tests(root, skips, &skipped, &["--package", "xtask"]))?,
     ];
     steps.extend([
-        step("doc tests", || watched(cargo(root, &[&["test", "--doc"], &everything[..]].concat())))?,
+        step("doc tests", || watched(cargo(root, &[&["test", "--doc"], &product[..]].concat())))?,
         step("docs", || {
             let mut docs = cargo(root, &[&["doc", "--no-deps"], &everything[..]].concat());
             Ok((run::shown(docs.env("RUSTDOCFLAGS", "-D warnings"))?, None))
@@ -92,22 +97,24 @@ fn prerequisites(root: &Path, skips: Skips, missing: &mut Vec<String>) -> Outcom
     Ok((succeeded, None))
 }
 
-fn tests(root: &Path, skips: Skips, skipped: &Skipped, everything: &[&str]) -> Outcome {
+fn tests(root: &Path, skips: Skips, skipped: &Skipped, packages: &[&str]) -> Outcome {
     let mut command = if NEXTEST.is_there(root) {
         // Two more than there are cores: many tests wait for a board or a server.
         let threads =
             format!("--test-threads={}", thread::available_parallelism().map_or(2, |cores| cores.get() + 2));
-        cargo(root, &[&["nextest", "run", "--no-fail-fast", &threads], everything].concat())
+        cargo(root, &[&["nextest", "run", "--no-fail-fast", &threads], packages].concat())
     } else {
-        cargo(root, &[&["test", "--lib", "--bins", "--tests", "--no-fail-fast"], everything].concat())
+        cargo(root, &[&["test", "--lib", "--bins", "--tests", "--no-fail-fast"], packages].concat())
     };
     command.env(skipped::VARIABLE, &skipped.file);
     match skips {
         Skips::Fail => command.env(STRICT, "1"),
         Skips::Pass => command.env_remove(STRICT),
     };
+    let before = skipped.lines()?.len();
     let (succeeded, counts) = watched(command)?;
-    Ok((succeeded, counts.map(|counts| counts.with_skips(skipped.lines().map_or(0, |lines| lines.len())))))
+    let skips = skipped.lines()?.len() - before;
+    Ok((succeeded, counts.map(|counts| counts.with_skips(skips))))
 }
 
 fn cargo(root: &Path, arguments: &[&str]) -> Command {
