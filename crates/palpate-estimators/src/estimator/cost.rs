@@ -9,7 +9,7 @@ use crate::features::FeatureKind;
 use crate::fit::{FitTask, check_folds};
 use crate::gaussian_process::folds_taken;
 use crate::influence::measured::{MeasuredInfluence, most_nodes, most_nuisance_nodes};
-use crate::influence::{Influence, Structure, force_linear, learning, sizes_over_a_model};
+use crate::influence::{Influence, Structure, calibration, force_linear, learning, sizes_over_a_model};
 use crate::network::LevenbergMarquardt;
 use crate::reading_check::ReadingCheck;
 use crate::recording::Recording;
@@ -256,7 +256,7 @@ impl Sizes {
         let factors = 2.0 * force_linear::FOLDS as f64 * kept.powi(3) / 3.0 + presses.powi(3);
         let learning = EVALUATIONS * searched.powi(3) / 3.0 / NARROW + factors / PRODUCTS;
         // With few presses, one leave-one-out fit per position is added.
-        let fits = if presses < force_linear::FEW { 1.0 + presses } else { 1.0 };
+        let fits = if presses < calibration::FEW { 1.0 + presses } else { 1.0 };
         FitCost {
             memory_bytes: NUMBER * (7.0 * presses * presses + 4.0 * nodes * self.channels)
                 + 2.0 * NUMBER * self.presses * (2.0 * self.channels + 10.0),

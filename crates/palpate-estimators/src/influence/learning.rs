@@ -3,6 +3,7 @@
 //! Rows of one place and force are averaged. Sensors of one kind share the hyperparameters, which maximize
 //! the log evidence of the Gaussian processes of [`super::prior`].
 
+use super::calibration::{Averaging, CalibrationRows, Observation, groups};
 use super::channels::Channels;
 use super::config::{Influence, InfluenceFitError, InfluenceSource};
 use super::prior::{Hyperparameters, Mean, Parts, Prior, Remainders};
@@ -13,7 +14,7 @@ use crate::thinning::thinned;
 use ndarray::{Array1, Array2, ArrayView1};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
-use palpate_mechanics::surface::Surface;
+use palpate_mechanics::surface::{Extent, Surface};
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{Cholesky, NotPositiveDefinite, mean};
 
@@ -55,14 +56,14 @@ pub(super) fn learn(
     let layout = task.setup.layout();
     check_sensors(layout)?;
     let untouched = UntouchedRows::of_recording(task.recording);
-    let presses = Presses::of_recording(task.recording, untouched.as_ref())?;
+    let rows = calibration_rows(task.recording, surface.extent(), untouched.as_ref())?;
     let needed = match (source, surface.extent().dimensions()) {
         (InfluenceSource::Recording, 1) => 3,
         // A quadratic surface has six coefficients.
         (InfluenceSource::Recording, _) => 6,
         _ => 1,
     };
-    let found = presses.distinct_positions();
+    let found = rows.positions_m().len();
     if found < needed {
         return Err(InfluenceFitError::TooFewPositions { needed, found });
     }
@@ -70,12 +71,12 @@ pub(super) fn learn(
         offsets: untouched.map_or_else(|| vec![0.0; layout.len()], |untouched| untouched.mean),
         noise_sd: vec![1.0; layout.len()],
         dead: layout.sensors().iter().map(|sensor| sensor.channel.dead).collect(),
-        reference_force_n: presses.mean_force_n(),
+        reference_force_n: mean_force_n(&rows),
         greatest_force_n: task.setup.greatest_force_n(),
         least_force_n: task.setup.force_range().map(|range| range.ends_n().0),
         false_alarm_rate,
     };
-    let learning = Learning { source, surface, layout, presses: &presses, places };
+    let learning = Learning { source, surface, layout, rows: &rows, places };
     for kind in SensorKind::ALL {
         let is_meant = |s: &usize| {
             let sensor = &layout.sensors()[*s];
@@ -104,7 +105,7 @@ struct Learning<'a> {
     source: InfluenceSource,
     surface: &'a dyn Surface,
     layout: &'a Layout,
-    presses: &'a Presses,
+    rows: &'a CalibrationRows,
     places: &'a [Position],
 }
 
@@ -117,24 +118,24 @@ impl<'a> Learning<'a> {
         channels: &mut Channels,
         take: &mut Take,
     ) -> Result<(), InfluenceFitError> {
-        let Self { source, surface, layout, presses, places } = *self;
+        let Self { source, surface, layout, rows, places } = *self;
         let mean = if source == InfluenceSource::Recording { Mean::Zero } else { Mean::Model };
-        let pressed: Vec<Position> = presses.presses.iter().map(|press| press.position).collect();
+        let pressed: Vec<Position> = (0..rows.len()).map(|row| rows.position(row)).collect();
         let remainders = Remainders::new(surface, kind, &pressed, places, watch)?;
         let prior = |s: &usize| Prior::new(surface, &layout.sensors()[*s], mean, watch);
         let priors: Vec<Prior<'a>> = living.iter().map(prior).collect::<Result<_, _>>()?;
         let with = |(prior, &s): (&Prior<'a>, &usize), kept: &[usize]| {
-            let noise = presses.noise_variance(layout, s);
-            SensorPresses::new(prior.clone(), presses, s, noise, kept, &remainders.presses)
+            let noise = noise_variance(rows, layout, s);
+            SensorRows::new(prior.clone(), rows, s, noise, kept, &remainders.presses)
         };
         let all: Vec<usize> = (0..pressed.len()).collect();
-        let few = presses.few();
-        let searched: Vec<SensorPresses> =
-            priors.iter().zip(living).map(|sensor| with(sensor, &few)).collect();
-        let noise_is_told = living.iter().all(|s| presses.noise_variance(layout, *s).is_some());
+        let few = rows_of_search(rows);
+        let searched: Vec<SensorRows> = priors.iter().zip(living).map(|sensor| with(sensor, &few)).collect();
+        let noise_is_told = living.iter().all(|s| noise_variance(rows, layout, *s).is_some());
         // Rows of one force confound offset and influence of a reaction: no support makes it 0 everywhere.
-        let has_one_force = is_one_force(presses.touching().map(|press| press.force_n));
-        let offset_is_open = has_one_force && !presses.is_untouched();
+        let touched = rows.touched();
+        let has_one_force = is_one_force(touched.iter().map(|row| rows.force_n[*row]));
+        let offset_is_open = has_one_force && touched.len() == rows.len();
         let is_reaction_alone = mean == Mean::Zero && kind == SensorKind::Reaction && offset_is_open;
         let told = Told { noise: noise_is_told, offset: is_reaction_alone };
         let mut hyper = most_probable(&searched, mean, surface.length_m(), told, watch)?;
@@ -155,119 +156,69 @@ impl<'a> Learning<'a> {
     }
 }
 
-/// Mean of the rows of one position and force; untouched rows have force 0.
-#[derive(Clone, Debug, PartialEq)]
-struct Press {
-    pub position: Position,
-    pub force_n: f64,
-    /// Noise variance of one reading over that of the mean.
-    pub count: f64,
-    pub mean: Vec<f64>,
-}
-
-#[derive(Clone, Debug, PartialEq)]
-struct Presses {
-    pub presses: Vec<Press>,
-    /// Squared deviations of repeats, per sensor.
-    scatter: Vec<f64>,
-    /// Readings minus means.
-    freedom: f64,
-}
-
 /// Weight of the rig's stated noise, in readings.
 const STATED_FREEDOM: f64 = 20.0;
 
-impl Presses {
-    /// Averages and thins the rows of a recording; untouched rows become one row of force 0.
-    ///
-    /// # Errors
-    /// [`InfluenceFitError::NoForce`] for a row without a force greater than 0.
-    pub fn of_recording(
-        recording: &Recording,
-        untouched: Option<&UntouchedRows>,
-    ) -> Result<Self, InfluenceFitError> {
-        let Some(untouched) = untouched else {
-            let rows: Vec<(Row, f64)> = recording.rows.iter().map(|row| (row.clone(), 1.0)).collect();
-            return Ok(Self::average(&rows)?.thinned(MOST_LEARNT));
-        };
-        let mut presses = Self::average(&untouched.tared_presses(recording))?.thinned(MOST_LEARNT);
-        presses.scatter.iter_mut().zip(&untouched.scatter).for_each(|(sum, scatter)| *sum += scatter);
-        presses.freedom += untouched.freedom;
-        if let Some(Press { position, mean, .. }) = presses.presses.last() {
-            let (position, mean) = (*position, vec![0.0; mean.len()]);
-            presses.presses.push(Press { position, force_n: 0.0, count: untouched.count, mean });
-        }
-        Ok(presses)
+/// Averages and thins the rows of a recording; untouched rows become the last one, of force 0.
+///
+/// # Errors
+/// [`InfluenceFitError::NoForce`] for a row without a force greater than 0.
+fn calibration_rows(
+    recording: &Recording,
+    extent: Extent,
+    untouched: Option<&UntouchedRows>,
+) -> Result<CalibrationRows, InfluenceFitError> {
+    let rows: Vec<(usize, Row, f64)> = match untouched {
+        Some(untouched) => untouched.tared_rows(recording),
+        None => recording.rows.iter().enumerate().map(|(i, row)| (i, row.clone(), 1.0)).collect(),
+    };
+    let mut observations = Vec::with_capacity(rows.len());
+    for (i, row, relative_variance) in &rows {
+        let force_n = row.force_n.filter(|force_n| *force_n > 0.0);
+        observations.push(Observation {
+            position_m: extent.coordinates_m(row.position).collect(),
+            force_n: force_n.ok_or(InfluenceFitError::NoForce { row: i + 1 })?,
+            time: 0.0,
+            row: *i,
+            relative_variance: *relative_variance,
+            reading: &row.reading,
+        });
     }
+    let groups = groups(&observations, Averaging::ByPlace);
+    let zeros = vec![0.0; recording.channels.len()];
+    let mut averaged = CalibrationRows::averaged(&observations, &groups, zeros.clone()).thinned(MOST_LEARNT);
+    if let Some(UntouchedRows { count, scatter, freedom, .. }) = untouched {
+        averaged.push_untouched(&zeros, *count, scatter, *freedom);
+    }
+    Ok(averaged)
+}
 
-    fn average(recording: &[(Row, f64)]) -> Result<Self, InfluenceFitError> {
-        let sensors = recording.first().map_or(0, |(row, _)| row.reading.len());
-        let mut rows: Vec<(Position, f64, &[f64], f64)> = Vec::with_capacity(recording.len());
-        for (i, (row, variance)) in recording.iter().enumerate() {
-            let force_n = row.force_n.filter(|force_n| *force_n > 0.0);
-            let force_n = force_n.ok_or(InfluenceFitError::NoForce { row: i + 1 })?;
-            rows.push((row.position, force_n, &row.reading, *variance));
-        }
-        rows.sort_by(|a, b| a.0.cmp_by_x_then_y(&b.0).then(a.1.total_cmp(&b.1)));
-        let mut presses = Vec::new();
-        let (mut scatter, mut freedom) = (vec![0.0; sensors], 0.0);
-        for group in rows.chunk_by(|a, b| a.0 == b.0 && a.1 == b.1) {
-            let count = group.len() as f64;
-            let column = |s: usize| group.iter().map(move |(_, _, reading, _)| reading[s]);
-            let mean: Vec<f64> = (0..sensors).map(|s| column(s).sum::<f64>() / count).collect();
-            for (s, scatter) in scatter.iter_mut().enumerate() {
-                *scatter += column(s).map(|value| (value - mean[s]).powi(2)).sum::<f64>();
-            }
-            freedom += count - 1.0;
-            let known = group.iter().map(|(.., variance)| variance).sum::<f64>() / count;
-            presses.push(Press { position: group[0].0, force_n: group[0].1, count: count / known, mean });
-        }
-        Ok(Self { presses, scatter, freedom })
-    }
+/// Rows of the search for hyperparameters, always with the untouched ones.
+fn rows_of_search(rows: &CalibrationRows) -> Vec<usize> {
+    let touched = rows.touched().len();
+    thinned(touched, MOST_PRESSES).chain(touched..rows.len()).collect()
+}
 
-    fn thinned(self, most: usize) -> Self {
-        let presses = thinned(self.presses.len(), most).map(|i| self.presses[i].clone()).collect();
-        Self { presses, ..self }
-    }
+fn mean_force_n(rows: &CalibrationRows) -> f64 {
+    mean(rows.touched().into_iter().map(|row| rows.force_n[row]))
+}
 
-    /// Indices for the search, always with the untouched rows.
-    fn few(&self) -> Vec<usize> {
-        let touching = self.touching().count();
-        thinned(touching, MOST_PRESSES).chain(touching..self.presses.len()).collect()
-    }
-
-    fn touching(&self) -> impl Iterator<Item = &Press> {
-        self.presses.iter().filter(|press| press.force_n > 0.0)
-    }
-
-    fn is_untouched(&self) -> bool {
-        self.presses.iter().any(|press| press.force_n == 0.0)
-    }
-
-    pub fn distinct_positions(&self) -> usize {
-        self.presses.chunk_by(|a, b| a.position == b.position).count()
-    }
-
-    pub fn mean_force_n(&self) -> f64 {
-        mean(self.touching().map(|press| press.force_n))
-    }
-
-    /// Variance of a sensor's noise from repeats and the rig's statement; `None` without either.
-    ///
-    /// Quantization to steps q adds q²/12 to the stated variance.
-    pub fn noise_variance(&self, layout: &Layout, sensor: usize) -> Option<f64> {
-        let channel = &layout.sensors()[sensor].channel;
-        let stated = channel.noise_sd.powi(2) + channel.resolution.powi(2) / 12.0;
-        let belief = if stated > 0.0 { STATED_FREEDOM } else { 0.0 };
-        let freedom = self.freedom + belief;
-        (freedom > 0.0).then(|| (self.scatter[sensor] + belief * stated) / freedom)
-    }
+/// Variance of a sensor's noise from repeats and the rig's statement; `None` without either.
+///
+/// Quantization to steps q adds q²/12 to the stated variance.
+fn noise_variance(rows: &CalibrationRows, layout: &Layout, sensor: usize) -> Option<f64> {
+    let channel = &layout.sensors()[sensor].channel;
+    let stated = channel.noise_sd.powi(2) + channel.resolution.powi(2) / 12.0;
+    let belief = if stated > 0.0 { STATED_FREEDOM } else { 0.0 };
+    let scatter = rows.repeats.squares.column(sensor).sum();
+    let freedom = rows.repeats.degrees_of_freedom.iter().sum::<f64>() + belief;
+    (freedom > 0.0).then(|| (scatter + belief * stated) / freedom)
 }
 
 /// Least variance relative to full scale squared, for posteriors within the precision of f64.
 const FLOOR: f64 = 1e-18;
 
-struct SensorPresses<'a> {
+struct SensorRows<'a> {
     pub prior: Prior<'a>,
     force_n: Vec<f64>,
     count: Vec<f64>,
@@ -283,30 +234,30 @@ struct SensorPresses<'a> {
 }
 
 struct Posterior<'s, 'a> {
-    presses: &'s SensorPresses<'a>,
+    presses: &'s SensorRows<'a>,
     hyper: Hyperparameters,
     cholesky: Cholesky,
     weights: Array1<f64>,
 }
 
-impl<'a> SensorPresses<'a> {
+impl<'a> SensorRows<'a> {
     pub fn new(
         prior: Prior<'a>,
-        presses: &Presses,
+        rows: &CalibrationRows,
         index: usize,
         noise: Option<f64>,
         kept: &[usize],
         remainder: &Array2<f64>,
     ) -> Self {
-        let of = |j: usize| &presses.presses[kept[j]];
-        let indices = 0..kept.len();
-        let parts: Vec<Parts> = indices.clone().map(|j| prior.parts(of(j).position)).collect();
-        let residual = |j: usize| of(j).mean[index] - of(j).force_n * prior.mean(parts[j]);
-        let mean_force_n = presses.mean_force_n();
+        let parts: Vec<Parts> = kept.iter().map(|row| prior.parts(rows.position(*row))).collect();
+        let residual = |(row, parts): (&usize, &Parts)| {
+            rows.means[[*row, index]] - rows.force_n[*row] * prior.mean(*parts)
+        };
+        let mean_force_n = mean_force_n(rows);
         Self {
-            force_n: indices.clone().map(|j| of(j).force_n).collect(),
-            count: indices.clone().map(|j| of(j).count).collect(),
-            residual: indices.map(residual).collect(),
+            force_n: kept.iter().map(|row| rows.force_n[*row]).collect(),
+            count: kept.iter().map(|row| rows.count[*row]).collect(),
+            residual: kept.iter().zip(&parts).map(residual).collect(),
             remainder: Array2::from_shape_fn((kept.len(), kept.len()), |(j, k)| {
                 remainder[[kept[j], kept[k]]]
             }),
@@ -362,7 +313,7 @@ impl Posterior<'_, '_> {
     }
 
     fn with_presses(&self, at: Parts, remainders: &ArrayView1<f64>) -> Array1<f64> {
-        let SensorPresses { prior, parts, force_n, .. } = self.presses;
+        let SensorRows { prior, parts, force_n, .. } = self.presses;
         let presses = parts.iter().zip(force_n).zip(remainders);
         let covariance = |((press, force_n), remainder): ((&Parts, &f64), &f64)| {
             force_n * prior.covariance(&self.hyper, at, *press, *remainder)
@@ -405,7 +356,7 @@ struct Told {
 
 /// Maximizes the log evidence by coordinate ascent in the logarithms.
 fn most_probable(
-    sensors: &[SensorPresses],
+    sensors: &[SensorRows],
     mean: Mean,
     length_m: f64,
     told: Told,
@@ -494,8 +445,8 @@ mod tests {
     use crate::recording::Provenance;
     use palpate_mechanics::sensing::SensorKind;
 
-    fn average(rows: &[(f64, f64, f64)]) -> Result<Presses, InfluenceFitError> {
-        Presses::of_recording(&recording(rows), None)
+    fn average(rows: &[(f64, f64, f64)]) -> Result<CalibrationRows, InfluenceFitError> {
+        calibration_rows(&recording(rows), Extent::line(0.4).unwrap(), None)
     }
 
     fn recording(rows: &[(f64, f64, f64)]) -> Recording {
@@ -521,38 +472,44 @@ mod tests {
     }
 
     #[test]
-    fn few_presses_have_all_forces_and_places() {
+    fn thinned_rows_have_all_forces_and_places() {
         let forces_n = [1.5, 3.0, 6.0];
         let presses = (0..120).flat_map(|i| forces_n.map(|force_n| (0.003 * f64::from(i), force_n, 1.0)));
         let few = average(&presses.collect::<Vec<_>>()).unwrap().thinned(120);
-        assert_eq!((few.presses.len(), few.distinct_positions()), (120, 120));
-        let of_force = |force_n: f64| few.presses.iter().filter(|press| press.force_n == force_n).count();
+        assert_eq!((few.len(), few.positions_m().len()), (120, 120));
+        let of_force = |force_n: f64| few.force_n.iter().filter(|of_row| **of_row == force_n).count();
         assert!(forces_n.iter().all(|force_n| of_force(*force_n) >= 20), "{few:?}");
     }
 
     #[test]
-    fn repeats_are_averaged_and_their_scatter_kept() {
+    fn averages_repeats_and_keeps_their_scatter() {
         let rows = [(0.1, 3.0, 1.0), (0.2, 3.0, 5.0), (0.1, 3.0, 3.0), (0.1, 2.0, 9.0)];
         let presses = average(&rows).unwrap();
-        let found: Vec<_> =
-            presses.presses.iter().map(|p| (p.position.x_m, p.force_n, p.count, p.mean[0])).collect();
+        let of_row =
+            |i: usize| (presses.position(i).x_m, presses.force_n[i], presses.count[i], presses.means[[i, 0]]);
+        let found: Vec<_> = (0..presses.len()).map(of_row).collect();
         assert_eq!(found, [(0.1, 2.0, 1.0, 9.0), (0.1, 3.0, 2.0, 2.0), (0.2, 3.0, 1.0, 5.0)]);
         let mut layout = Layout::even(SensorKind::Deflection, 1, 0.4);
-        assert_eq!(presses.noise_variance(&layout, 0), Some(2.0));
+        assert_eq!(noise_variance(&presses, &layout, 0), Some(2.0));
         layout.edit(|sensors| sensors[0].channel.noise_sd = 1.0).unwrap();
-        let blended = presses.noise_variance(&layout, 0).unwrap();
+        let blended = noise_variance(&presses, &layout, 0).unwrap();
         assert!((blended - 22.0 / 21.0).abs() < 1e-15);
     }
 
     #[test]
-    fn a_press_without_force_is_refused() {
+    fn refuses_a_row_without_force_by_its_number_in_the_recording() {
         let error = average(&[(0.1, 3.0, 1.0), (0.2, -1.0, 1.0)]).unwrap_err();
         assert_eq!(error, InfluenceFitError::NoForce { row: 2 });
+        let mut recording = recording(&[(0.0, 3.0, 0.1), (0.1, 3.0, 1.0), (0.2, -1.0, 1.0)]);
+        recording.rows[0].force_n = Some(0.0);
+        let untouched = UntouchedRows::of_recording(&recording).unwrap();
+        let error = calibration_rows(&recording, Extent::line(0.4).unwrap(), Some(&untouched)).unwrap_err();
+        assert_eq!(error, InfluenceFitError::NoForce { row: 3 });
     }
 
     #[test]
-    fn nothing_is_known_of_noise_without_repeats() {
+    fn noise_is_unknown_without_repeats_or_a_statement() {
         let presses = average(&[(0.1, 3.0, 1.0)]).unwrap();
-        assert_eq!(presses.noise_variance(&Layout::even(SensorKind::Deflection, 1, 0.4), 0), None);
+        assert_eq!(noise_variance(&presses, &Layout::even(SensorKind::Deflection, 1, 0.4), 0), None);
     }
 }

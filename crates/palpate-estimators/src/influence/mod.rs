@@ -2,6 +2,7 @@
 
 mod at_nodes;
 mod beam;
+pub(crate) mod calibration;
 mod channels;
 mod config;
 pub(crate) mod force_linear;

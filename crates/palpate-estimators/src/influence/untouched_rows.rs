@@ -86,17 +86,17 @@ impl UntouchedRows {
         }
     }
 
-    /// Returns the touched rows minus their offsets, each with the relative variance of the reading.
+    /// Returns the touched rows minus their offsets, each with its index and the relative variance of the reading.
     ///
     /// Without a drift, the learning accounts for the common error of the mean.
-    pub fn tared_presses(&self, recording: &Recording) -> Vec<(Row, f64)> {
+    pub fn tared_rows(&self, recording: &Recording) -> Vec<(usize, Row, f64)> {
         let times = recording.times_or_order();
-        let rows = recording.rows.iter().zip(times).filter(|(row, _)| row.touches());
-        rows.map(|(row, time)| {
+        let rows = recording.rows.iter().zip(times).enumerate().filter(|(_, (row, _))| row.touches());
+        rows.map(|(i, (row, time))| {
             let RowOffset { values, relative_variance } = self.offset_at(time);
             let mut row = row.clone();
             row.reading.iter_mut().zip(values).for_each(|(value, offset)| *value -= offset);
-            (row, 1.0 + if self.drifts() { relative_variance } else { 0.0 })
+            (i, row, 1.0 + if self.drifts() { relative_variance } else { 0.0 })
         })
         .collect()
     }

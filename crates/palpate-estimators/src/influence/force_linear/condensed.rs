@@ -13,17 +13,17 @@
 use super::drift::END;
 use super::evidence::{ChannelFit, Evidence};
 use super::posterior::of_equal_ratio;
-use super::presses::Presses;
 use super::prior::Prior;
+use crate::influence::calibration::CalibrationRows;
 use crate::influence::measured::MeasuredError;
 use ndarray::{Array1, Array2, Axis as Dimension};
 use palpate_numerics::NotPositiveDefinite;
 use palpate_numerics::watch::{Cancelled, Watch};
 use std::sync::Arc;
 
-impl Presses {
+impl CalibrationRows {
     /// Condenses to about `most` presses, for a separable prior without drift.
-    pub fn condensed(
+    pub(super) fn condensed(
         &self,
         prior: &Prior,
         fits: &[ChannelFit],
@@ -59,7 +59,7 @@ impl Presses {
     }
 
     /// Condenses neighbours in time to about `most` presses, corrected to a common position by `estimate`.
-    pub fn condensed_in_time(
+    pub(super) fn condensed_in_time(
         &self,
         prior: &Prior,
         estimate: &Estimate,
@@ -121,9 +121,9 @@ impl Presses {
                 .collect();
             let force_n = all.prior.force_of_relative_response(sums.mean_square.sqrt());
             let squares = squares * all.prior.relative_noise(force_n, &sums.position_m);
-            let repeated = Arc::make_mut(&mut self.repeated);
+            let repeated = Arc::make_mut(&mut self.repeats);
             repeated.force_n.push(force_n);
-            repeated.freedom.push((cell.len() - ends.len()) as f64);
+            repeated.degrees_of_freedom.push((cell.len() - ends.len()) as f64);
             repeated.positions_m.push(sums.position_m.clone());
             repeated.squares.push_row(squares.view()).expect("as many channels as all presses have");
         }
@@ -161,7 +161,7 @@ impl Presses {
 }
 
 struct All<'a> {
-    presses: &'a Presses,
+    presses: &'a CalibrationRows,
     responses: Vec<f64>,
     prior: &'a Prior,
 }
@@ -246,7 +246,7 @@ impl Sums {
 }
 
 pub(super) struct Estimate {
-    presses: Presses,
+    presses: CalibrationRows,
     responses: Vec<f64>,
     offsets: Array1<f64>,
     /// Polynomial coefficients, and A⁻¹·(y − H·β), one column per channel.
@@ -255,7 +255,11 @@ pub(super) struct Estimate {
 }
 
 impl Estimate {
-    pub fn new(presses: Presses, prior: &Prior, fits: &[ChannelFit]) -> Result<Self, NotPositiveDefinite> {
+    pub fn new(
+        presses: CalibrationRows,
+        prior: &Prior,
+        fits: &[ChannelFit],
+    ) -> Result<Self, NotPositiveDefinite> {
         let mut coefficients = Array2::zeros((1 + prior.polynomials(), fits.len()));
         let mut weights = Array2::zeros((presses.len(), fits.len()));
         let evidence = Evidence::new(&presses, prior, &[]);

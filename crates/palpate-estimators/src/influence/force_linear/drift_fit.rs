@@ -7,8 +7,8 @@ use super::condensed::Estimate;
 use super::drift::END;
 use super::evidence::ChannelFit;
 use super::posterior::offsets;
-use super::presses::Presses;
 use super::prior::Prior;
+use crate::influence::calibration::CalibrationRows;
 use crate::influence::measured::MeasuredError;
 use ndarray::Array2;
 use palpate_numerics::watch::Watch;
@@ -16,12 +16,12 @@ use palpate_numerics::watch::Watch;
 pub(super) struct DriftFit {
     prior: Prior,
     fits: Vec<ChannelFit>,
-    presses: Presses,
+    presses: CalibrationRows,
 }
 
-impl Presses {
+impl CalibrationRows {
     /// Condenses to about `most` presses, corrected to the last row; returns the drift too.
-    pub fn condensed_under_drift(
+    pub(super) fn condensed_under_drift(
         &self,
         prior: &Prior,
         fits: &[ChannelFit],
@@ -62,9 +62,13 @@ impl DriftFit {
         Ok(self.offsets_at(&[END])?.iter().map(|of_channel| of_channel[0].1).collect())
     }
 
-    fn taken_off(&self, presses: &Presses) -> Result<Presses, MeasuredError> {
+    fn taken_off(&self, presses: &CalibrationRows) -> Result<CalibrationRows, MeasuredError> {
         let drifts = self.until_the_end(&presses.time)?;
         let drifts = Array2::from_shape_fn(presses.means.dim(), |(i, c)| drifts[c][i]);
-        Ok(Presses { means: &presses.means + &drifts, time: vec![END; presses.len()], ..presses.clone() })
+        Ok(CalibrationRows {
+            means: &presses.means + &drifts,
+            time: vec![END; presses.len()],
+            ..presses.clone()
+        })
     }
 }

@@ -7,8 +7,8 @@
 //! column u(p): |M·L⁻¹·y|² falls by τ·(vᵀ·w)²/(1 + τ·vᵀ·v), with v = M·L⁻¹·u and w = M·L⁻¹·y, and the
 //! determinants grow by ln(1 + τ·vᵀ·v). Positions and powers of ten of τ are averaged.
 
-use super::presses::{Presses, Repeated};
 use super::prior::Prior;
+use crate::influence::calibration::{CalibrationRows, Repeats};
 use ndarray::linalg::general_mat_mul;
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
 use palpate_numerics::{Cholesky, NotPositiveDefinite, mean_and_variance};
@@ -105,7 +105,7 @@ impl ChannelFit {
 }
 
 pub(super) struct Evidence<'a> {
-    pub presses: &'a Presses,
+    pub presses: &'a CalibrationRows,
     pub prior: &'a Prior,
     /// Without noise and drift.
     covariance: Array2<f64>,
@@ -122,12 +122,12 @@ pub(super) struct Evidence<'a> {
 struct NoisePrior {
     changes: f64,
     rounding: f64,
-    /// [`Presses::fewness`].
+    /// [`CalibrationRows::fewness`].
     weight: f64,
 }
 
 impl NoisePrior {
-    fn of_channels(presses: &Presses) -> Vec<Self> {
+    fn of_channels(presses: &CalibrationRows) -> Vec<Self> {
         let channel = |c: usize| {
             let (_, changes) = mean_and_variance(presses.means.column(c).iter().copied());
             Self { changes, rounding: presses.rounding[c], weight: presses.fewness() }
@@ -155,7 +155,7 @@ struct Noise {
 }
 
 impl Noise {
-    fn new(presses: &Presses, prior: &Prior) -> Self {
+    fn new(presses: &CalibrationRows, prior: &Prior) -> Self {
         let n = presses.len();
         let time = &presses.time;
         let drift = || Array2::from_shape_fn((n, n), |(i, j)| prior.drift_between(time[i], time[j]));
@@ -185,19 +185,19 @@ struct RepeatedNoise {
 }
 
 impl RepeatedNoise {
-    fn new(presses: &Presses, prior: &Prior) -> Self {
-        let Repeated { positions_m, force_n, freedom, squares } = &*presses.repeated;
+    fn new(presses: &CalibrationRows, prior: &Prior) -> Self {
+        let Repeats { positions_m, force_n, degrees_of_freedom, squares } = &*presses.repeats;
         let relative: Array1<f64> = force_n
             .iter()
             .zip(positions_m)
             .map(|(force_n, position_m)| prior.relative_noise(*force_n, position_m))
             .collect();
         Self {
-            freedom: freedom.iter().sum(),
+            freedom: degrees_of_freedom.iter().sum(),
             squares: squares.t().dot(&relative.mapv(f64::recip)),
             log_determinant: relative
                 .iter()
-                .zip(freedom)
+                .zip(degrees_of_freedom)
                 .map(|(variance, freedom)| freedom * variance.ln())
                 .sum(),
         }
@@ -205,7 +205,7 @@ impl RepeatedNoise {
 }
 
 impl<'a> Evidence<'a> {
-    pub fn new(presses: &'a Presses, prior: &'a Prior, sensors_m: &[Vec<f64>]) -> Self {
+    pub fn new(presses: &'a CalibrationRows, prior: &'a Prior, sensors_m: &[Vec<f64>]) -> Self {
         Self {
             presses,
             prior,

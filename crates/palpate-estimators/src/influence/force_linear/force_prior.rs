@@ -1,8 +1,8 @@
 //! Prior of the contact force by the calibration forces.
 
-use super::presses::Presses;
 use super::prior::Prior;
 use crate::force_prior::ForceRange;
+use crate::influence::calibration::CalibrationRows;
 use crate::recording::is_one_force;
 use palpate_numerics::mean_and_variance;
 
@@ -21,7 +21,7 @@ pub(super) struct PressForces {
 }
 
 impl PressForces {
-    pub fn new(presses: &Presses, prior: &Prior, stated: Option<ForceRange>) -> Self {
+    pub fn new(presses: &CalibrationRows, prior: &Prior, stated: Option<ForceRange>) -> Self {
         let pressed = || presses.force_n.iter().filter(|force_n| **force_n != 0.0);
         let responses_n = || pressed().map(|force_n| prior.response_n(*force_n));
         let (mean_n, variance_n2) = mean_and_variance(responses_n());

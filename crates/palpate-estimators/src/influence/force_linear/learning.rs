@@ -10,10 +10,10 @@ use super::outliers::OutlierTest;
 use super::place_noise::PlaceNoise;
 use super::place_noise_search::PlaceNoiseSearch;
 use super::posterior::{Functions, functions, of_equal_ratio, offsets, readings};
-use super::presses::{Presses, Repeats, compare};
 use super::prior::{Prior, Source};
 use super::shared_errors::loadings;
 use crate::fit::FitTask;
+use crate::influence::calibration::{Averaging, CalibrationRows, compare};
 use crate::influence::config::Structure;
 use crate::influence::measured::MeasuredError;
 use crate::recording::Recording;
@@ -34,9 +34,9 @@ pub(crate) const FOLDS: usize = 5;
 
 pub(super) struct Learnt {
     /// All presses.
-    pub pressed: Presses,
+    pub pressed: CalibrationRows,
     /// Presses of the fit.
-    presses: Presses,
+    presses: CalibrationRows,
     drift: Option<DriftFit>,
     pub prior: Prior,
     /// Changing channels, from 0.
@@ -123,8 +123,8 @@ impl Learnt {
         set_aside: &[usize],
         watch: Watch,
     ) -> Result<Option<Self>, MeasuredError> {
-        let presses_of = |repeats| Presses::of_recording(setup, recording, repeats, set_aside);
-        let Some(pressed) = presses_of(Repeats::Consecutive) else { return Ok(None) };
+        let presses_of = |repeats| CalibrationRows::of_recording(setup, recording, repeats, set_aside);
+        let Some(pressed) = presses_of(Averaging::Consecutive) else { return Ok(None) };
         let live = pressed.changing_channels();
         if pressed.distinct_forces() < 2 || live.is_empty() {
             return Ok(None);
@@ -153,7 +153,7 @@ impl Learnt {
             (presses, Some(drift))
         } else {
             // Repeats of one position determine the noise; neighbouring positions do not.
-            let merged = presses_of(Repeats::All).map(|merged| merged.of_channels(&live));
+            let merged = presses_of(Averaging::ByPlace).map(|merged| merged.of_channels(&live));
             let merged = merged.as_ref().unwrap_or(&pressed);
             (merged.condensed(&smooth.prior, &smooth.fits, most_presses, watch)?, None)
         };
@@ -246,7 +246,8 @@ impl Learnt {
         watch: Watch,
     ) -> Result<f64, MeasuredError> {
         const ONE_OF: usize = 5;
-        let Some(presses) = Presses::of_recording(setup, recording, Repeats::Consecutive, &[]) else {
+        let Some(presses) = CalibrationRows::of_recording(setup, recording, Averaging::Consecutive, &[])
+        else {
             return Ok(f64::NEG_INFINITY);
         };
         let presses = presses.of_channels(&self.live);
@@ -279,7 +280,7 @@ impl Learnt {
 }
 
 /// Variance factor for a scale from few positions: that of Student's t over the normal density.
-fn few_positions(prior: &Prior, presses: &Presses) -> f64 {
+fn few_positions(prior: &Prior, presses: &CalibrationRows) -> f64 {
     /// Student's t has a variance above 2 degrees of freedom.
     const LEAST: usize = 3;
     /// Degree of freedom of the length scale.
@@ -294,7 +295,7 @@ fn few_positions(prior: &Prior, presses: &Presses) -> f64 {
 ///
 /// Wrong positions or forces make all channels scatter with force; half of this is assumed to shift the
 /// position.
-fn dependence(prior: &Prior, presses: &Presses) -> f64 {
+fn dependence(prior: &Prior, presses: &CalibrationRows) -> f64 {
     const MOVES_POSITION: f64 = 0.5;
     let scattered = mean(presses.force_n.iter().map(|force_n| 1.0 - 1.0 / prior.scatter_of(*force_n)));
     1.0 + scattered * (MOVES_POSITION * presses.centre.len() as f64 - 1.0).max(0.0)
@@ -302,7 +303,7 @@ fn dependence(prior: &Prior, presses: &Presses) -> f64 {
 
 fn all_functions(
     prior: &Prior,
-    presses: &Presses,
+    presses: &CalibrationRows,
     fits: &[ChannelFit],
     sensors_m: &[Vec<f64>],
     places_m: &[Vec<f64>],
@@ -331,7 +332,7 @@ struct Judged {
 }
 
 impl Judged {
-    fn new(found: Found, presses: &Presses, watch: Watch) -> Result<Self, MeasuredError> {
+    fn new(found: Found, presses: &CalibrationRows, watch: Watch) -> Result<Self, MeasuredError> {
         const MOST: f64 = 25.0;
         let positions_m = presses.positions_m();
         if positions_m.len() < LEAST_TO_JUDGE {
@@ -368,9 +369,9 @@ impl Found {
     /// Adds squared errors of presses `held`, predicted from `kept`, and their variances.
     fn add_errors(
         &self,
-        presses: &Presses,
+        presses: &CalibrationRows,
         held: &[usize],
-        kept: &Presses,
+        kept: &CalibrationRows,
         errors: &mut Vec<[f64; 3]>,
         watch: Watch,
     ) -> Result<(), MeasuredError> {
@@ -407,7 +408,7 @@ const LEAST_SMOOTHER: f64 = 10.0;
 const LEAST_GAIN: f64 = 10.0;
 
 struct Search<'a> {
-    presses: &'a Presses,
+    presses: &'a CalibrationRows,
     extent: Extent,
     structure: Structure,
     noise: Option<&'a PlaceNoise>,

@@ -4,9 +4,9 @@
 //! standard normal for calibrated intervals. The mean of z² divides the log-likelihood, as for overdispersion
 //! (McCullagh and Nelder, *Generalized Linear Models*, 1989).
 
-use super::presses::FEW;
 use super::{ForceLinearLocator, MOST_PRESSES, fit_condensed};
 use crate::fit::FitTask;
+use crate::influence::calibration::FEW;
 use crate::influence::config::Structure;
 use crate::influence::measured::MeasuredError;
 use crate::recording::Row;

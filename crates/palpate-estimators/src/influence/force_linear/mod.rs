@@ -15,7 +15,6 @@ mod outliers;
 mod place_noise;
 mod place_noise_search;
 mod posterior;
-mod presses;
 mod prior;
 mod residuals;
 mod saturation;
@@ -29,6 +28,7 @@ pub(crate) use learning::{FOLDS, MOST_PRESSES, MOST_SEARCHED};
 pub use locator::{ForceLinearLocator, Scatter};
 pub use prior::Source;
 
+use super::calibration::{Averaging, CalibrationRows, shares};
 use super::config::Structure;
 use super::grid::Axis;
 use super::measured::MeasuredError;
@@ -42,8 +42,6 @@ use learning::Learnt;
 use locator::{Stored, Tables};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::mean;
-pub(crate) use presses::FEW;
-use presses::{Presses, Repeats, shares};
 use prior::Prior;
 use saturation_fit::Linearization;
 
@@ -85,7 +83,7 @@ pub(crate) fn is_unsaturated(task: FitTask) -> Result<bool, MeasuredError> {
 
 /// Returns whether all rows have forces and two of these differ.
 pub(super) fn has_forces(setup: &Setup, recording: &Recording) -> bool {
-    let presses = Presses::of_recording(setup, recording, Repeats::Consecutive, &[]);
+    let presses = CalibrationRows::of_recording(setup, recording, Averaging::Consecutive, &[]);
     presses.is_some_and(|presses| presses.distinct_forces() >= 2)
 }
 
@@ -151,7 +149,7 @@ fn fit_condensed(
 /// Divisor of the log-likelihood (overdispersion) for few presses, as channels share their hyperparameters.
 ///
 /// The constants give 95 % coverage on strips with 5 to 24 presses.
-fn channels_as_one(presses: &Presses) -> f64 {
+fn channels_as_one(presses: &CalibrationRows) -> f64 {
     const FEWEST: f64 = 4.0;
     const MOST: f64 = 1.8;
     1.0 + left_out::weight(presses.len()) * ((presses.len() as f64 / FEWEST).clamp(1.0, MOST) - 1.0)
@@ -181,7 +179,7 @@ pub(super) fn offset_course(
     Ok(Some(course))
 }
 
-fn axes(presses: &Presses, prior: &Prior, extent: Extent) -> [Axis; 2] {
+fn axes(presses: &CalibrationRows, prior: &Prior, extent: Extent) -> [Axis; 2] {
     let positions_m = presses.positions_m();
     let axis = |k: usize, most: usize| {
         let values = positions_m.iter().map(|position_m| position_m[k]).collect();

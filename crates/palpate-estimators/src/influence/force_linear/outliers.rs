@@ -2,9 +2,9 @@
 //! Regression*, 1982, section 2.2.1), with 1 % false alarms per recording.
 
 use super::evidence::ChannelFit;
-use super::presses::Presses;
 use super::prior::Prior;
 use super::residuals::Residuals;
+use crate::influence::calibration::CalibrationRows;
 use crate::influence::measured::MeasuredError;
 use ndarray::Zip;
 use palpate_numerics::watch::Watch;
@@ -20,7 +20,7 @@ impl OutlierTest<'_> {
     /// First rows of the worst outliers; all `tested` presses share the noise estimate.
     pub fn worst(
         &self,
-        presses: &Presses,
+        presses: &CalibrationRows,
         tested: usize,
         at_once: usize,
     ) -> Result<Vec<usize>, NotPositiveDefinite> {
@@ -58,7 +58,7 @@ impl OutlierTest<'_> {
     }
 
     /// Tests parts of neighbouring presses until no outlier remains.
-    pub fn by_parts(&self, presses: &Presses, watch: Watch) -> Result<Vec<usize>, MeasuredError> {
+    pub fn by_parts(&self, presses: &CalibrationRows, watch: Watch) -> Result<Vec<usize>, MeasuredError> {
         /// Presses of a part: time is quadratic, and distant presses add no information.
         const PART: usize = 100;
         // Fewer positions do not identify offset and polynomials.

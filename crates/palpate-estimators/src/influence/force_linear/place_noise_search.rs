@@ -7,9 +7,9 @@
 
 use super::evidence::{ALL_DECADES, ChannelFit, Evidence};
 use super::place_noise::{PlaceNoise, Shape};
-use super::presses::Presses;
 use super::prior::Prior;
 use super::residuals::Residuals;
+use crate::influence::calibration::CalibrationRows;
 use crate::influence::measured::MeasuredError;
 use ndarray::{Array1, Array2};
 use palpate_numerics::Cholesky;
@@ -21,7 +21,7 @@ const LEAST_GAIN: f64 = 10.0;
 const LEAST_MORE: f64 = 3.0;
 
 pub(super) struct PlaceNoiseSearch<'a> {
-    pub presses: &'a Presses,
+    pub presses: &'a CalibrationRows,
     pub prior: &'a Prior,
     pub sensors_m: &'a [Vec<f64>],
     pub watch: Watch<'a>,
@@ -142,7 +142,7 @@ impl PlaceNoiseSearch<'_> {
         /// Prior precision of θ.
         const PRECISION: f64 = 0.05;
         let Fitted { prior, fits, .. } = at;
-        let (presses, repeated) = (self.presses, &self.presses.repeated);
+        let (presses, repeated) = (self.presses, &self.presses.repeats);
         let places_m = presses.positions_m();
         let slopes_of = |positions_m: &[Vec<f64>], force_n: &[f64]| {
             let mut slopes = noise.slopes(&places_m, positions_m);
@@ -160,10 +160,10 @@ impl PlaceNoiseSearch<'_> {
                 let (told, square) = (residuals.told[[i, c]], residuals.squares[[i, c]]);
                 (of_presses.row(i), if square.is_finite() { told.clamp(0.0, 1.0) } else { 0.0 }, square)
             });
-            let repeats = (0..repeated.freedom.len()).map(|i| {
+            let repeats = (0..repeated.degrees_of_freedom.len()).map(|i| {
                 let noise = fit.noise_variance()
                     * prior.relative_noise(repeated.force_n[i], &repeated.positions_m[i]);
-                let freedom = repeated.freedom[i];
+                let freedom = repeated.degrees_of_freedom[i];
                 (of_repeats.row(i), freedom, repeated.squares[[i, c]] / (freedom * noise))
             });
             let all: Vec<_> = errors.chain(repeats).filter(|(_, told, _)| *told > 0.0).collect();

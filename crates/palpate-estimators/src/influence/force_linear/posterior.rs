@@ -7,8 +7,8 @@
 
 use super::drift::END;
 use super::evidence::{ChannelFit, Evidence, Restricted, SourceFit, WhiteSources};
-use super::presses::Presses;
 use super::prior::Prior;
+use crate::influence::calibration::CalibrationRows;
 use crate::influence::measured::MeasuredError;
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis as Dimension, s};
 use palpate_numerics::NotPositiveDefinite;
@@ -50,7 +50,7 @@ impl<'a> Functional<'a> {
         Self { time: None, response: 1.0, place_m }
     }
 
-    fn readings(prior: &Prior, presses: &'a Presses) -> Vec<Self> {
+    fn readings(prior: &Prior, presses: &'a CalibrationRows) -> Vec<Self> {
         let responses = prior.responses(presses).into_iter();
         let times_and_places = presses.time.iter().zip(&presses.positions_m);
         let readings = responses.zip(times_and_places);
@@ -69,7 +69,7 @@ struct Functionals<'a> {
 }
 
 impl<'a> Functionals<'a> {
-    fn new(prior: &Prior, presses: &Presses, ratio: f64, asked: &'a [Functional<'a>]) -> Self {
+    fn new(prior: &Prior, presses: &CalibrationRows, ratio: f64, asked: &'a [Functional<'a>]) -> Self {
         let mut effects = Array2::zeros((1 + prior.polynomials(), asked.len()));
         let mut covariance = Array2::zeros((presses.len(), asked.len()));
         let mut variance = vec![0.0; asked.len()];
@@ -114,7 +114,7 @@ struct Moments {
 /// Offsets and influences of unit response, for channels of equal ρ.
 pub(super) fn functions(
     prior: &Prior,
-    presses: &Presses,
+    presses: &CalibrationRows,
     channels: &[(usize, &ChannelFit)],
     sensors_m: &[Vec<f64>],
     places_m: &[Vec<f64>],
@@ -150,10 +150,10 @@ pub(super) fn functions(
 /// Noiseless readings of `others`, for channels of equal ρ.
 pub(super) fn readings(
     prior: &Prior,
-    presses: &Presses,
+    presses: &CalibrationRows,
     channels: &[(usize, &ChannelFit)],
     sensors_m: &[Vec<f64>],
-    others: &Presses,
+    others: &CalibrationRows,
 ) -> Result<Vec<Vec<(f64, f64)>>, MeasuredError> {
     let told = Posterior::new(prior, presses, channels, sensors_m)?;
     let moments = told.moments(&Functional::readings(prior, others));
@@ -165,7 +165,7 @@ pub(super) fn readings(
 
 pub(super) fn offsets(
     prior: &Prior,
-    presses: &Presses,
+    presses: &CalibrationRows,
     fits: &[ChannelFit],
     sensors_m: &[Vec<f64>],
     times: &[f64],
@@ -187,7 +187,7 @@ pub(super) fn offsets(
 
 struct Posterior<'a> {
     prior: &'a Prior,
-    presses: &'a Presses,
+    presses: &'a CalibrationRows,
     known: Known,
     channels: Vec<Told>,
 }
@@ -195,7 +195,7 @@ struct Posterior<'a> {
 impl<'a> Posterior<'a> {
     fn new(
         prior: &'a Prior,
-        presses: &'a Presses,
+        presses: &'a CalibrationRows,
         channels: &[(usize, &ChannelFit)],
         sensors_m: &[Vec<f64>],
     ) -> Result<Self, MeasuredError> {

@@ -15,8 +15,8 @@
 
 use super::drift::DriftCourse;
 use super::place_noise::PlaceNoise;
-use super::presses::Presses;
 use crate::fit::LocatorFault;
+use crate::influence::calibration::CalibrationRows;
 use ndarray::{Array1, Array2};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::regression::Kernel;
@@ -93,7 +93,7 @@ pub(super) struct Prior {
 
 impl Prior {
     /// Smooth over a quarter of the surface, linear in force, without drift.
-    pub fn smooth(extent: Extent, presses: &Presses) -> Self {
+    pub fn smooth(extent: Extent, presses: &CalibrationRows) -> Self {
         let spans_m = [Some(extent.length_m()), extent.width_m()].into_iter().flatten();
         Self {
             extent,
@@ -166,12 +166,12 @@ impl Prior {
     }
 
     /// φ/F̄ of every press.
-    pub fn responses(&self, presses: &Presses) -> Vec<f64> {
+    pub fn responses(&self, presses: &CalibrationRows) -> Vec<f64> {
         presses.force_n.iter().map(|force_n| self.response_to(*force_n)).collect()
     }
 
     /// Lower triangle over s², without noise and drift.
-    pub fn covariance(&self, presses: &Presses) -> Array2<f64> {
+    pub fn covariance(&self, presses: &CalibrationRows) -> Array2<f64> {
         let n = presses.len();
         let responses = self.responses(presses);
         let mut covariance = Array2::zeros((n, n));
@@ -196,7 +196,7 @@ impl Prior {
         if force_n == 0.0 { 1.0 } else { self.scatter_of(force_n) * self.noise_at(place_m) }
     }
 
-    pub fn relative_noise_of(&self, presses: &Presses, i: usize) -> f64 {
+    pub fn relative_noise_of(&self, presses: &CalibrationRows, i: usize) -> f64 {
         self.relative_noise(presses.force_n[i], &presses.positions_m[i])
     }
 
@@ -216,7 +216,12 @@ impl Prior {
     }
 
     /// Covariance of f in units of s²/F̄.
-    pub fn influence_covariance(&self, presses: &Presses, responses: &[f64], place_m: &[f64]) -> Array1<f64> {
+    pub fn influence_covariance(
+        &self,
+        presses: &CalibrationRows,
+        responses: &[f64],
+        place_m: &[f64],
+    ) -> Array1<f64> {
         let positions = presses.positions_m.iter().zip(responses);
         positions.map(|(at_m, phi)| phi * self.smooth_part * self.correlation(place_m, at_m)).collect()
     }
@@ -253,7 +258,7 @@ impl Prior {
     }
 
     /// H: n × (1 + polynomials).
-    pub fn effects(&self, presses: &Presses) -> Array2<f64> {
+    pub fn effects(&self, presses: &CalibrationRows) -> Array2<f64> {
         let mut effects = Array2::ones((presses.len(), 1 + self.polynomials()));
         for ((mut row, place_m), phi) in
             effects.outer_iter_mut().zip(&presses.positions_m).zip(self.responses(presses))
@@ -277,7 +282,7 @@ impl Prior {
     }
 
     /// Readings by sources, one column per sensor.
-    pub fn sources(&self, presses: &Presses, sensors_m: &[Vec<f64>]) -> Array2<f64> {
+    pub fn sources(&self, presses: &CalibrationRows, sensors_m: &[Vec<f64>]) -> Array2<f64> {
         let mut sources =
             Array2::zeros((presses.len(), if self.source.is_some() { sensors_m.len() } else { 0 }));
         for ((mut row, place_m), phi) in

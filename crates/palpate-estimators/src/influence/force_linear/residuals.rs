@@ -3,8 +3,8 @@
 
 use super::evidence::{ChannelFit, Evidence};
 use super::posterior::of_equal_ratio;
-use super::presses::Presses;
 use super::prior::Prior;
+use crate::influence::calibration::CalibrationRows;
 use ndarray::{Array1, Array2};
 use palpate_numerics::NotPositiveDefinite;
 
@@ -19,7 +19,7 @@ pub(super) struct Residuals {
 
 impl Residuals {
     pub fn new(
-        presses: &Presses,
+        presses: &CalibrationRows,
         prior: &Prior,
         fits: &[ChannelFit],
         sensors_m: &[Vec<f64>],

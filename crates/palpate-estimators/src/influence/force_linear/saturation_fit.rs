@@ -5,9 +5,9 @@
 //! which resembles saturation.
 
 use super::learning::{Learnt, MOST_PRESSES, MOST_SEARCHED};
-use super::presses::relative_times;
 use super::saturation::Saturation;
 use crate::fit::FitTask;
+use crate::influence::calibration::relative_times;
 use crate::influence::config::Structure;
 use crate::influence::measured::MeasuredError;
 use crate::recording::Recording;

@@ -11,15 +11,15 @@
 //! independently. For point sensors along a line, sources and cubics dominate, without common errors.
 
 use super::evidence::{ChannelFit, Evidence};
-use super::presses::Presses;
 use super::prior::Prior;
+use crate::influence::calibration::CalibrationRows;
 use ndarray::Array2;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::{NotPositiveDefinite, median};
 
 /// Loadings u; empty without common-mode errors.
 pub(super) fn loadings(
-    presses: &Presses,
+    presses: &CalibrationRows,
     prior: &Prior,
     fits: &[ChannelFit],
     sensors_m: &[Vec<f64>],

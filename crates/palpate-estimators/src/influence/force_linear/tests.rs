@@ -4,12 +4,12 @@
 
 use super::locator::{Stored, Tables};
 use super::posterior::Functions;
-use super::presses::{Presses, Repeats};
 use super::prior::Prior;
 use super::{ForceLinearLocator, evidence, fit, fit_condensed, posterior};
 use crate::fit::Fit;
 use crate::fit::{FitTask, Locate};
 use crate::fixtures::Covered;
+use crate::influence::calibration::{Averaging, CalibrationRows};
 use crate::influence::{Influence, InfluenceFitError, InfluenceLocator, Structure};
 use crate::recording::{Recording, Row};
 use crate::setup::Setup;
@@ -663,7 +663,7 @@ const GAUGE_FIT: evidence::ChannelFit =
     evidence::ChannelFit { ratio: 1e-4, signal: 1e4, evidence: 0.0, sources: Vec::new() };
 
 /// Functions of the first gauge along a strip, under a smooth prior.
-fn functions_of(presses: &Presses, prior: &Prior) -> Functions {
+fn functions_of(presses: &CalibrationRows, prior: &Prior) -> Functions {
     let places_m: Vec<Vec<f64>> = (0..50).map(|i| vec![STRIP_M * f64::from(i) / 49.0]).collect();
     posterior::functions(prior, presses, &[(0, &GAUGE_FIT)], &[], &places_m, Watch::NONE).unwrap().remove(0)
 }
@@ -672,7 +672,8 @@ fn functions_of(presses: &Presses, prior: &Prior) -> Functions {
 fn presses_that_come_to_their_places_again_are_thinned_at_all_of_them() {
     let bench = Bench::strip(0, 600, 10);
     let presses =
-        Presses::of_recording(&bench.setup(), &bench.recording(), Repeats::Consecutive, &[]).unwrap();
+        CalibrationRows::of_recording(&bench.setup(), &bench.recording(), Averaging::Consecutive, &[])
+            .unwrap();
     for most in [150, 60, 599] {
         let few = presses.thinned(most);
         assert_eq!((few.len(), few.positions_m().len()), (most, 10));
@@ -684,12 +685,15 @@ fn presses_that_come_to_their_places_again_are_thinned_at_all_of_them() {
 fn presses_of_the_same_places_are_condensed_without_loss() {
     let bench = Bench::strip(3, 120, 15);
     let presses =
-        Presses::of_recording(&bench.setup(), &bench.recording(), Repeats::Consecutive, &[]).unwrap();
+        CalibrationRows::of_recording(&bench.setup(), &bench.recording(), Averaging::Consecutive, &[])
+            .unwrap();
     for response in [1.0, 0.7] {
         let prior = Prior { response, ..Prior::smooth(bench.extent, &presses) };
         let condensed = presses.condensed(&prior, &vec![GAUGE_FIT; GAUGES], 30, Watch::NONE).unwrap();
         assert_eq!((presses.len(), condensed.len()), (120, 30));
-        let rows = |presses: &Presses| presses.len() as f64 + presses.repeated.freedom.iter().sum::<f64>();
+        let rows = |presses: &CalibrationRows| {
+            presses.len() as f64 + presses.repeats.degrees_of_freedom.iter().sum::<f64>()
+        };
         assert_eq!(rows(&presses), rows(&condensed));
         let [all, few] = [&presses, &condensed].map(|presses| functions_of(presses, &prior));
         let same = |a: f64, b: f64| (a - b).abs() < 1e-7 * a.abs().max(1.0);

@@ -2,11 +2,11 @@
 
 use super::config::{MeasuredError, MeasuredInfluence, Scale};
 use super::locator::NuisanceRole;
+use crate::influence::calibration::{Averaging, CalibrationRows, Observation, groups};
 use crate::recording::Recording;
 use crate::setup::Setup;
 use ndarray::Array2;
 use palpate_numerics::mean;
-use std::collections::HashMap;
 
 /// Nuisance coordinates row by row: named columns, or a recorded force that the setup does not fix.
 pub(super) fn nuisance_coordinates(
@@ -96,40 +96,34 @@ impl Presses {
         }
         let extent = setup.surface().extent();
         let further = Further::of_rows(nuisances);
-        let mut distinct: Vec<Vec<f64>> = Vec::new();
-        let mut known: HashMap<Vec<u64>, usize> = HashMap::new();
-        let mut places = Vec::with_capacity(rows.len());
+        let mut observations = Vec::with_capacity(rows.len());
         for (i, row) in rows.iter().enumerate() {
-            let mut at: Vec<f64> = extent.coordinates_m(row.position).collect();
+            let mut position_m: Vec<f64> = extent.coordinates_m(row.position).collect();
             if let Some(first) = nuisances[i].first() {
-                at.push(scaled(nuisance_scale, "the nuisance coordinate", i, *first)?);
+                position_m.push(scaled(nuisance_scale, "the nuisance coordinate", i, *first)?);
             }
-            at.extend(further.iter().map(|further| nuisances[i][further.index]));
-            let bits = at.iter().map(|value| (value + 0.0).to_bits()).collect();
-            places.push(*known.entry(bits).or_insert_with(|| {
-                distinct.push(at);
-                distinct.len() - 1
-            }));
+            position_m.extend(further.iter().map(|further| nuisances[i][further.index]));
+            // −0 is 0.
+            position_m.iter_mut().for_each(|value| *value += 0.0);
+            let reading = outputs.row(i).to_slice().expect("a new array is contiguous");
+            let (force_n, time, relative_variance) = (1.0, 0.0, 1.0);
+            observations.push(Observation { position_m, force_n, time, row: i, relative_variance, reading });
         }
+        let groups = groups(&observations, Averaging::ByFirstRow);
+        let averaged = CalibrationRows::averaged(&observations, &groups, vec![0.0; channels]);
+        let mut places = vec![0; rows.len()];
+        for (place, group) in groups.iter().enumerate() {
+            group.iter().for_each(|row| places[*row] = place);
+        }
+        let searched = averaged.positions_m.first().map_or(0, Vec::len);
         let coordinates =
-            Array2::from_shape_fn((distinct.len(), distinct.first().map_or(0, Vec::len)), |(i, k)| {
-                distinct[i][k]
-            });
-        let mut means = Array2::<f64>::zeros((distinct.len(), channels));
-        let mut counts = vec![0.0; distinct.len()];
-        for (place, output) in places.iter().zip(outputs.outer_iter()) {
-            means.row_mut(*place).scaled_add(1.0, &output);
-            counts[*place] += 1.0;
-        }
-        for (mut mean, count) in means.outer_iter_mut().zip(counts) {
-            mean /= count;
-        }
+            Array2::from_shape_fn((averaged.len(), searched), |(i, k)| averaged.positions_m[i][k]);
         let has_nuisance = nuisances.first().is_some_and(|row| !row.is_empty());
         Ok(Self {
             readings,
             nuisance: nuisance_scale,
             coordinates,
-            means,
+            means: averaged.means,
             places,
             outputs,
             has_nuisance,

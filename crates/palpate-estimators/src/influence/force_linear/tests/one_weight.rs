@@ -68,26 +68,29 @@ fn nothing_but_proportion_to_the_force_is_learnt_from_one_weight() {
     use crate::estimator::{Auto, Estimator};
     use crate::fit::{Fit, FitTask};
     use crate::influence::{Influence, InfluenceLocator};
-    let structures = |spread: f64| {
+    let presses = |spread: f64| {
         let mut bench = Bench::strip(11, 20, 20);
         for (i, row) in bench.presses.iter_mut().enumerate() {
             row.force_n = Some(500.0 * (1.0 + if i % 2 == 0 { spread } else { -spread }));
         }
         let untouched = (0..10).map(|_| bench.row(Position::default(), 0.0)).collect::<Vec<_>>();
         bench.presses.extend(untouched);
-        let (setup, recording) = (bench.setup(), bench.recording());
-        let task = FitTask::new(&setup, &recording);
+        (bench.setup(), bench.recording())
+    };
+    let candidates = |setup: &Setup, recording: &Recording| {
+        let task = FitTask::new(setup, recording);
         let candidates = |estimator: Estimator| {
             estimator.candidates(task).map(|all| all.iter().map(Estimator::name).collect::<Vec<_>>())
         };
-        let found =
-            [Estimator::Influence(Influence::default()), Estimator::Auto(Auto::quick())].map(candidates);
-        (found, Influence::default().fit_method(task).unwrap())
+        [Estimator::Influence(Influence::default()), Estimator::Auto(Auto::quick())].map(candidates)
     };
-    let ([own, auto], locator) = structures(0.02);
+    let (setup, recording) = presses(0.02);
+    let [own, auto] = candidates(&setup, &recording);
     assert_eq!((own, auto.unwrap()), (None, vec!["influence force-linear", "gaussian-process"]));
+    let locator = Influence::default().fit_method(FitTask::new(&setup, &recording)).unwrap();
     assert!(matches!(locator, InfluenceLocator::ForceLinear(_)));
-    let ([own, _], _) = structures(0.5);
+    let (setup, recording) = presses(0.5);
+    let [own, _] = candidates(&setup, &recording);
     assert_eq!(own.unwrap().len(), Structure::STATED.len());
 }
 
@@ -103,7 +106,8 @@ fn presses_of_nearly_one_weight_leave_the_force_open_over_a_decade() {
         let mut bench = Bench::strip(11, 9, 9);
         bench.presses = forces_n.iter().map(|force_n| bench.row(Position::along(0.1), *force_n)).collect();
         let recording = bench.recording();
-        let presses = Presses::of_recording(&bench.setup(), &recording, Repeats::All, &[]).unwrap();
+        let presses =
+            CalibrationRows::of_recording(&bench.setup(), &recording, Averaging::ByPlace, &[]).unwrap();
         PressForces::new(&presses, &Prior::smooth(bench.extent, &presses), None).range.unwrap().ends_n()
     };
     for weight_n in [98.1, 0.1 + 0.2, 1e-3, 196.2, 250.0, 500.0, 1000.0] {

@@ -1,76 +1,101 @@
-//! Presses: calibration rows of recorded force, with repeats averaged.
+//! Calibration rows: rows of one place and force, averaged.
 
 use crate::recording::{LEAST_FREEDOM, Recording, is_same_force};
 use crate::setup::Setup;
 use crate::thinning::thinned;
-use ndarray::{Array2, Axis as Dimension};
+use ndarray::{Array2, Axis as Dimension, aview1};
+use palpate_mechanics::contact::Position;
 use palpate_numerics::{mean, mean_and_variance};
 use std::cmp::Ordering;
 use std::sync::Arc;
 
+/// Rows that are averaged, and the order of their means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Repeats {
+pub(super) enum Averaging {
     /// Consecutive rows, with little drift between them.
     Consecutive,
-    All,
+    /// All rows of one place and force, by place, then force.
+    ByPlace,
+    /// All rows of one place and force, by their first row.
+    ByFirstRow,
 }
 
+/// Row of a recording.
 #[derive(Clone, Debug)]
-pub(super) struct Presses {
+pub(super) struct Observation<'a> {
+    pub position_m: Vec<f64>,
+    pub force_n: f64,
+    /// From 0 at the first row to 1 at the last.
+    pub time: f64,
+    pub row: usize,
+    /// Variance of the reading over that of the noise.
+    pub relative_variance: f64,
+    pub reading: &'a [f64],
+}
+
+impl Observation<'_> {
+    fn compare(&self, other: &Self) -> Ordering {
+        compare(&self.position_m, &other.position_m).then(self.force_n.total_cmp(&other.force_n))
+    }
+}
+
+/// Returns the indices of the observations of each calibration row.
+pub(super) fn groups(rows: &[Observation], averaging: Averaging) -> Vec<Vec<usize>> {
+    let mut indices: Vec<usize> = (0..rows.len()).collect();
+    if averaging != Averaging::Consecutive {
+        indices.sort_by(|a, b| rows[*a].compare(&rows[*b]));
+    }
+    let is_one = |a: &usize, b: &usize| rows[*a].compare(&rows[*b]).is_eq();
+    let mut groups: Vec<_> = indices.chunk_by(is_one).map(<[usize]>::to_vec).collect();
+    if averaging == Averaging::ByFirstRow {
+        groups.sort_by_key(|group| group[0]);
+    }
+    groups
+}
+
+/// Means of the observations of one place and force.
+#[derive(Clone, Debug)]
+pub(super) struct CalibrationRows {
     /// Along and, on a plane, across.
     pub positions_m: Vec<Vec<f64>>,
+    /// 0 of an untouched surface.
     pub force_n: Vec<f64>,
-    /// Number of averaged rows.
+    /// Noise variance of a reading over that of the mean: the number of rows, for equal variances.
     pub count: Vec<f64>,
     /// From 0 at the first row to 1 at the last.
     pub time: Vec<f64>,
-    /// First row of each press.
+    /// First row of each mean.
     pub row: Vec<usize>,
-    /// Mean reading of each channel.
+    /// Subtracted from the readings of each channel.
     pub centre: Vec<f64>,
     /// Mean reading minus the centre.
     pub means: Array2<f64>,
     /// Rounding variance of each channel; 0 where none is detected.
     pub rounding: Vec<f64>,
     /// Repeats of the whole recording, also in subsets.
-    pub repeated: Arc<Repeated>,
+    pub repeats: Arc<Repeats>,
 }
 
-/// Scatter of repeats, one row per press.
+/// Scatter of repeats, one row per place and force.
 #[derive(Clone, Debug)]
-pub(super) struct Repeated {
+pub(super) struct Repeats {
     pub positions_m: Vec<Vec<f64>>,
     pub force_n: Vec<f64>,
-    /// Number of repeats minus one.
-    pub freedom: Vec<f64>,
+    pub degrees_of_freedom: Vec<f64>,
     /// Squared deviations from the mean of repeats.
     pub squares: Array2<f64>,
 }
 
-struct RowPress<'a> {
-    position_m: Vec<f64>,
-    force_n: f64,
-    time: f64,
-    row: usize,
-    reading: &'a [f64],
-}
-
-impl RowPress<'_> {
-    fn order(&self, other: &Self) -> Ordering {
-        compare(&self.position_m, &other.position_m).then(self.force_n.total_cmp(&other.force_n))
-    }
-}
-
 /// Number of presses below which noise and hyperparameters need prior information.
-pub const FEW: f64 = 25.0;
+pub(crate) const FEW: f64 = 25.0;
 
-impl Presses {
-    /// Collects the presses without the rows `set_aside`; `None` where a force is missing.
+impl CalibrationRows {
+    /// Averages the rows of a recording but for the `excluded`; `None` where a force is missing.
     pub fn of_recording(
         setup: &Setup,
         recording: &Recording,
-        repeats: Repeats,
-        set_aside: &[usize],
+        averaging: Averaging,
+        excluded: &[usize],
     ) -> Option<Self> {
         let extent = setup.surface().extent();
         let times = relative_times(recording);
@@ -82,50 +107,81 @@ impl Presses {
                 0.0 => vec![0.0; extent.dimensions()],
                 _ => extent.coordinates_m(found.position).collect(),
             };
-            if set_aside.binary_search(&row).is_err() {
-                rows.push(RowPress { position_m, force_n, time: times[row], row, reading: &found.reading });
+            if excluded.binary_search(&row).is_err() {
+                let (time, reading) = (times[row], found.reading.as_slice());
+                rows.push(Observation { position_m, force_n, time, row, relative_variance: 1.0, reading });
             }
         }
-        if repeats == Repeats::All {
-            rows.sort_by(RowPress::order);
-        }
-        let groups: Vec<_> = rows.chunk_by(|a, b| a.order(b).is_eq()).collect();
-        Some(Self::of_groups(&rows, &groups, recording.channels.len()))
+        let channels = 0..recording.channels.len();
+        let centre = channels.map(|c| mean(rows.iter().map(|row| row.reading[c]))).collect();
+        Some(Self::averaged(&rows, &groups(&rows, averaging), centre))
     }
 
-    fn of_groups(rows: &[RowPress], groups: &[&[RowPress]], channels: usize) -> Self {
-        let centre: Vec<f64> = (0..channels).map(|c| mean(rows.iter().map(|row| row.reading[c]))).collect();
+    /// Averages each group of observations.
+    pub fn averaged(rows: &[Observation], groups: &[Vec<usize>], centre: Vec<f64>) -> Self {
+        let channels = centre.len();
+        let of = |group: &[usize], value: &dyn Fn(&Observation) -> f64| {
+            mean(group.iter().map(|i| value(&rows[*i])))
+        };
         let mut means = Array2::zeros((groups.len(), channels));
-        let repeated: Vec<usize> = (0..groups.len()).filter(|i| groups[*i].len() > 1).collect();
         let mut squares = Array2::zeros((groups.len(), channels));
-        for ((mut mean, mut squares), group) in
+        for ((mut means, mut squares), group) in
             means.outer_iter_mut().zip(squares.outer_iter_mut()).zip(groups)
         {
-            let count = group.len() as f64;
-            for (c, mean) in mean.iter_mut().enumerate() {
-                *mean = group.iter().map(|row| row.reading[c]).sum::<f64>() / count;
-                squares[c] = group.iter().map(|row| (row.reading[c] - *mean).powi(2)).sum::<f64>();
-                *mean -= centre[c];
+            for (c, centre) in centre.iter().enumerate() {
+                let mean = of(group, &|row| row.reading[c]);
+                squares[c] = group.iter().map(|i| (rows[*i].reading[c] - mean).powi(2)).sum::<f64>();
+                means[c] = mean - centre;
             }
         }
+        let repeated: Vec<usize> = (0..groups.len()).filter(|i| groups[*i].len() > 1).collect();
         let column = |c: usize| -> Vec<f64> { rows.iter().map(|row| row.reading[c]).collect() };
-        let rounding = (0..channels).map(|c| rounding_variance(&column(c))).collect();
+        let first = |group: &Vec<usize>| &rows[group[0]];
+        let count = |group: &Vec<usize>| group.len() as f64 / of(group, &|row| row.relative_variance);
         Self {
-            positions_m: groups.iter().map(|group| group[0].position_m.clone()).collect(),
-            force_n: groups.iter().map(|group| group[0].force_n).collect(),
-            count: groups.iter().map(|group| group.len() as f64).collect(),
-            time: groups.iter().map(|group| mean(group.iter().map(|row| row.time))).collect(),
-            row: groups.iter().map(|group| group[0].row).collect(),
-            repeated: Arc::new(Repeated {
-                positions_m: repeated.iter().map(|i| groups[*i][0].position_m.clone()).collect(),
-                force_n: repeated.iter().map(|i| groups[*i][0].force_n).collect(),
-                freedom: repeated.iter().map(|i| (groups[*i].len() - 1) as f64).collect(),
+            positions_m: groups.iter().map(|group| first(group).position_m.clone()).collect(),
+            force_n: groups.iter().map(|group| first(group).force_n).collect(),
+            count: groups.iter().map(count).collect(),
+            time: groups.iter().map(|group| of(group, &|row| row.time)).collect(),
+            row: groups.iter().map(|group| first(group).row).collect(),
+            rounding: (0..channels).map(|c| rounding_variance(&column(c))).collect(),
+            repeats: Arc::new(Repeats {
+                positions_m: repeated.iter().map(|i| first(&groups[*i]).position_m.clone()).collect(),
+                force_n: repeated.iter().map(|i| first(&groups[*i]).force_n).collect(),
+                degrees_of_freedom: repeated.iter().map(|i| (groups[*i].len() - 1) as f64).collect(),
                 squares: squares.select(Dimension(0), &repeated),
             }),
             centre,
             means,
-            rounding,
         }
+    }
+
+    /// Appends the mean of `count` untouched rows, with their scatter.
+    pub fn push_untouched(&mut self, mean: &[f64], count: f64, scatter: &[f64], degrees_of_freedom: f64) {
+        const AS_MANY: &str = "untouched rows have the channels of the others";
+        // Without a force the position does not matter.
+        let any_m = self.positions_m.last().cloned().unwrap_or_default();
+        self.positions_m.push(any_m.clone());
+        self.force_n.push(0.0);
+        self.count.push(count);
+        self.time.push(0.0);
+        self.row.push(0);
+        self.means.push_row(aview1(mean)).expect(AS_MANY);
+        let repeats = Arc::make_mut(&mut self.repeats);
+        repeats.positions_m.push(any_m);
+        repeats.force_n.push(0.0);
+        repeats.degrees_of_freedom.push(degrees_of_freedom);
+        repeats.squares.push_row(aview1(scatter)).expect(AS_MANY);
+    }
+
+    pub fn position(&self, i: usize) -> Position {
+        let of = |k: usize| self.positions_m[i].get(k).copied().unwrap_or(0.0);
+        Position { x_m: of(0), y_m: of(1) }
+    }
+
+    /// Rows of a touched surface.
+    pub fn touched(&self) -> Vec<usize> {
+        (0..self.len()).filter(|i| self.force_n[*i] != 0.0).collect()
     }
 
     pub fn len(&self) -> usize {
@@ -208,9 +264,9 @@ impl Presses {
             centre: of(&self.centre),
             means: self.means.select(Dimension(1), channels),
             rounding: of(&self.rounding),
-            repeated: Arc::new(Repeated {
-                squares: self.repeated.squares.select(Dimension(1), channels),
-                ..(*self.repeated).clone()
+            repeats: Arc::new(Repeats {
+                squares: self.repeats.squares.select(Dimension(1), channels),
+                ..(*self.repeats).clone()
             }),
             ..self.clone()
         }
@@ -227,7 +283,7 @@ impl Presses {
             means: self.means.select(Dimension(0), kept),
             centre: self.centre.clone(),
             rounding: self.rounding.clone(),
-            repeated: Arc::clone(&self.repeated),
+            repeats: Arc::clone(&self.repeats),
         }
     }
 
