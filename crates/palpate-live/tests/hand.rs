@@ -341,7 +341,7 @@ fn contacts_of(locator: &Locator, arrived: &[Arrived]) -> usize {
 
 /// Touches by the hand that calibrated the board, after a tare; `setup` is that of the locator.
 fn touch(rig: &Rig, setup: &Setup, style: HandStyle, faults: FaultConfig) -> Tally {
-    const RATE_HZ: usize = 100;
+    const RATE_HZ: usize = 50;
     let mut bench = Bench::new(rig, style, faults, RATE_HZ as f64, 7);
     let (calibration, ..) = bench.calibrate();
     let locator = fit(rig, setup, &calibration);

@@ -42,7 +42,8 @@ const COMPLAINTS: [&[&str]; 7] = [
 ];
 
 fn bench() -> TempDir {
-    let bench = folder(Toml::parse(NOISY_BEAM).estimator("neighbours"));
+    let rig = Toml::parse(NOISY_BEAM).estimator("neighbours");
+    let bench = folder(format!("{rig}\n[design]\nsites = \"20 mm\"\n"));
     let path = bench.path();
     fs::write(path.join("influence.toml"), NOISY_BEAM).unwrap();
     fs::write(path.join("load.toml"), LOAD_PROFILE).unwrap();

@@ -86,8 +86,8 @@ fn every_estimator_is_fitted_inspected_and_locates() {
 
 #[test]
 fn auto_takes_the_best_and_says_why() {
-    // Networks take their time; two presses at each position do.
-    let folder = folder(Toml::parse(NOISY_BEAM).set("training.repeats", 2));
+    // Networks take their time; two presses at each of six positions do.
+    let folder = folder(Toml::parse(NOISY_BEAM).set("training.count", 6).set("training.repeats", 2));
     with_estimator(folder.path(), "auto");
     let fitted = run(folder.path(), &["fit", "other.toml", "-o", "locator.json"]);
     let told = String::from_utf8(fitted.stderr.clone()).unwrap();
@@ -100,7 +100,7 @@ fn auto_takes_the_best_and_says_why() {
     let (best, error_mm) = (rows[0][0], number(&rows[0], 1));
     assert!(["influence", "closed-form"].contains(&best) && error_mm < 0.3, "{why}");
     assert!(why.starts_with(&format!("chosen: {best}, by mean error × interval score")), "{why}");
-    assert!(said(&fitted).starts_with(&format!("{best} fitted to 20 rows")), "{why}");
+    assert!(said(&fitted).starts_with(&format!("{best} fitted to 12 rows")), "{why}");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use crate::support::command::{palpate, run, said};
 #[cfg(unix)]
 use crate::support::shell::run_line;
+use std::fs;
 use std::path::Path;
 
 /// Every verb, and the verbs of `design`.
@@ -125,6 +126,10 @@ fn examples_of_the_help_work() {
             }
             let output = run_line(folder.path(), &format!("set -o pipefail; {line}"));
             assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+        }
+        if verb == ["init"] {
+            let beam = folder.path().join("beam.toml");
+            fs::write(&beam, fs::read_to_string(&beam).unwrap() + "\n[design]\nsites = \"20 mm\"\n").unwrap();
         }
     }
 }

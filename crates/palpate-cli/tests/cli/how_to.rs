@@ -105,10 +105,10 @@ const FILES: [(&str, &[&str]); 16] = [
     ("locator.json", &["fit", "bench.toml", "-o", "locator.json"]),
     ("other.json", &["fit", "bench.toml", "--seed", "1", "-o", "other.json"]),
     ("board.json", &["fit", "bench.toml", "-o", "board.json"]),
-    ("press.mcap", &["record", "locator.json", "--from", BOARD, "--duration", "2 s", "--out", "press.mcap"]),
+    ("press.mcap", &["record", "locator.json", "--from", BOARD, "--duration", "1 s", "--out", "press.mcap"]),
     (
         "killed.mcap",
-        &["record", "locator.json", "--from", BOARD, "--duration", "2 s", "--out", "killed.mcap"],
+        &["record", "locator.json", "--from", BOARD, "--duration", "1 s", "--out", "killed.mcap"],
     ),
     ("coarse.toml", &[]),
     ("alarms.toml", &[]),
@@ -123,7 +123,7 @@ const REPLACED: [(&str, &str); 11] = [
     ("192.168.1.5:8377", "127.0.0.1:0"),
     ("mqtt://user@host:1883/", "mqtt://user@127.0.0.1:1/"),
     ("mqtt://host/", "mqtt://127.0.0.1:1/"),
-    ("--duration \"10 s\"", "--duration \"2 s\""),
+    ("--duration \"10 s\"", "--duration \"1 s\""),
     ("compare rig.toml", "compare rig.toml --only influence --only neighbours"),
     ("--counts 2..16", "--counts 2..3 --verify 1"),
     ("examples/paper.toml --count 5", "coarse.toml --count 2"),
@@ -245,7 +245,7 @@ impl<'a> Bench<'a> {
         let has = |word: &str| words.iter().any(|other| other == word);
         let mut arguments: Vec<&str> = words[1..].iter().map(String::as_str).collect();
         if arguments[0] == "record" && !has("--duration") {
-            arguments.extend(["--duration", "2 s"]);
+            arguments.extend(["--duration", "1 s"]);
         }
         if arguments[0] == "serve" {
             let address = if has("--listen") { &[][..] } else { &["--listen", "127.0.0.1:0"] };

@@ -1,5 +1,6 @@
 //! Names in the JSON of every verb are those of the table in docs/reference/command-line.md.
 
+use crate::support::board::set_force_linear;
 use crate::support::command::{complained, run, said};
 use crate::support::examples::NOISY_BEAM;
 use crate::support::toml::Toml;
@@ -77,12 +78,7 @@ fn names_are_those_of_the_manual() {
     let auto = Toml::parse(NOISY_BEAM).set("training.repeats", 2).estimator("auto");
     let auto = auto.add("estimator.only", toml_edit::Array::from_iter(["neighbours", "centroid"]));
     fs::write(folder.path().join("auto.toml"), auto.to_string()).unwrap();
-    let measured = fs::read_to_string(folder.path().join("board/board.toml")).unwrap();
-    fs::write(
-        folder.path().join("board/board.toml"),
-        Toml::parse(&measured).estimator("influence").to_string(),
-    )
-    .unwrap();
+    set_force_linear(&folder.path().join("board/board.toml"));
     let board = ["--data", "board/presses.csv", "-o", "board.json"];
     let design = ["--count", "3", "--trials", "1", "--calibrations", "1", "--verify", "1"];
     let record = ["--from", "simulated:beam.toml?rate=200", "--duration", "2 s", "-o", "session.mcap"];

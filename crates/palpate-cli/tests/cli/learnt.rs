@@ -64,7 +64,7 @@ fn noise_by_place_is_said() {
     let mut csv = "Position,Force,g1,g2,g3,g4,g5,g6\n".to_owned();
     for i in 0..120 {
         let touch = Touch {
-            position_mm: 15.0 + 13.5 * f64::from((8 * i) % 21),
+            position_mm: 15.0 + 15.8 * f64::from((7 * i) % 18),
             force_n: 1.0 + f64::from((3 * i) % 5),
         };
         // Four times the noise on one half: the mean of two readings and three times their difference.

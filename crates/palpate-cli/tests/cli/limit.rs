@@ -168,7 +168,7 @@ fn benches_without_a_limit_are_refused_in_words() {
 #[test]
 fn a_locator_of_a_measured_surface_has_a_limit_and_a_lightest_touch() {
     let (folder, mut board) = (folder(board::linear_rig()), Board::new(3));
-    fs::write(folder.path().join("presses.csv"), board.calibration(210)).unwrap();
+    fs::write(folder.path().join("presses.csv"), board.calibration(144)).unwrap();
     said(&run(folder.path(), &["fit", "rig.toml", "--data", "presses.csv", "-o", "board.json"]));
     let told = json(folder.path(), &["limit", "board.json", "--force", "3 N", "--report", "page"]);
     // Raw channels have no places: 42.86 mm is where even sensors would be.

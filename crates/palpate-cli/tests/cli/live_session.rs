@@ -2,6 +2,7 @@
 
 use crate::support::command::{Running, complained, folder, palpate, run, said};
 use crate::support::examples::{NOISY_BEAM, PLATE};
+use crate::support::toml::Toml;
 use serde_json::Value;
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -10,6 +11,7 @@ use std::process::Stdio;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 use tempfile::TempDir;
+use toml_edit::Array;
 
 /// Readings of a simulated board.
 const BOARD: &str = "simulated:rig.toml?rate=500";
@@ -60,7 +62,9 @@ fn tracked_and_filtered_sessions_are_recorded_and_located_again_to_the_last_bit(
 
 #[test]
 fn a_contact_on_a_plane_has_its_covariance_tracked_or_not() {
-    let folder = bench(PLATE);
+    // At 16 places no fit checks its intervals.
+    let rig = Toml::parse(PLATE).set("training.grid", Array::from_iter([4, 4])).add("surface.elements", 48);
+    let folder = bench(&rig.to_string());
     for (out, more) in [("single.mcap", &[][..]), ("tracked.mcap", &["--track"])] {
         let told = record(folder.path(), out, &[more, &["--duration", "3 s"]].concat());
         let located: Vec<&Value> = told.iter().filter(|sample| sample["status"] == "located").collect();
@@ -119,7 +123,8 @@ fn options_that_do_not_go_with_locator_source_or_each_other_are_refused_with_a_r
     let told = refused(&[&record[..], &["file:some.mcap?speed=0", "--low-pass", "20 Hz"]].concat());
     assert!(told.contains("speed=0") && told.contains("palpate replay"), "{told}");
     assert!(!folder.path().join("never.mcap").exists());
-    let plate = bench(PLATE);
+    let plate = Toml::parse(PLATE).set("training.grid", Array::from_iter([4, 4])).add("surface.elements", 48);
+    let plate = bench(&plate.to_string());
     let told = complained(
         &run(plate.path(), &[&record[..], &[BOARD, "--track", "--frequency", "17 Hz"]].concat()),
         2,

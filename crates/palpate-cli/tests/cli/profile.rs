@@ -43,7 +43,7 @@ fn the_example_tells_both_pads() {
 
 #[test]
 fn the_pressure_on_a_plate_is_a_map() {
-    let folder = folder(PRESSURE_MAP);
+    let folder = folder(Toml::parse(PRESSURE_MAP).add("surface.elements", 32));
     let told = said(&run(folder.path(), &["profile", "rig.toml"]));
     assert!(told.contains("across") && told.contains("centre y, mm"), "{told}");
     let json = said(&run(folder.path(), &["profile", "rig.toml", "--json", "--report", "page"]));

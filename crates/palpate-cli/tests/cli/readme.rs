@@ -1,5 +1,6 @@
 //! The commands of the README, in a folder that has nothing but the sample data.
 
+use crate::support::board::set_force_linear;
 use crate::support::command::{json, run, said};
 use std::fs;
 use std::path::Path;
@@ -28,6 +29,8 @@ fn three_commands_lead_from_the_sample_data_to_located_contacts() {
     let commands = commands("The same with three commands");
     let [init, fit, locate] = commands.as_slice() else { panic!("{commands:?}") };
     said(&run(folder.path(), init));
+    // The first tutorial has the same commands, whose fit chooses this structure too.
+    set_force_linear(&folder.path().join("strip.toml"));
     said(&run(folder.path(), fit));
     let located = run(folder.path(), locate);
     said(&located);

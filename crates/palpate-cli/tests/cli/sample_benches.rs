@@ -2,6 +2,7 @@
 #![cfg(unix)]
 
 use crate::support::attempt::{Attempt, wait_for_answer};
+use crate::support::board::set_force_linear;
 use crate::support::command::{complained, json, run, said};
 use crate::support::shell::run_line;
 use serde_json::Value;
@@ -14,6 +15,10 @@ const BENCHES: [&str; 5] = ["beam", "board", "skin", "plate", "finger"];
 fn try_commands(bench: &str) -> f64 {
     let folder = tempfile::tempdir().unwrap();
     let told = said(&run(folder.path(), &["init", "--example", bench, "bench"]));
+    if bench == "skin" {
+        // The tutorials fit the rig of a measured surface as it is: the choice among all estimators takes four times as long.
+        set_force_linear(&folder.path().join("bench/skin.toml"));
+    }
     let (files, commands) = told.split_once("Next:\n").unwrap();
     for file in files.lines() {
         assert!(folder.path().join(file).is_file(), "{bench}: {file}");

@@ -169,7 +169,7 @@ fn a_stopped_study_goes_on_where_it_was() {
     let folder = tempfile::tempdir().unwrap();
     let study = arms_of_ten().set("name", "long").to_string();
     fs::write(folder.path().join("long.toml"), study).unwrap();
-    let arguments = ["study", "long.toml", "--seeds", "150", "--threads", "1", "--out"];
+    let arguments = ["study", "long.toml", "--seeds", "60", "--threads", "1", "--out"];
     said(&run(folder.path(), &[&arguments[..], &["whole"]].concat()));
     let whole = fs::read_to_string(folder.path().join("whole/networks.csv")).unwrap();
 

@@ -13,7 +13,7 @@ const FIRST: usize = 60;
 /// A folder with a board's rig and locator, and the board.
 fn fitted() -> (TempDir, Board) {
     let (folder, mut board) = (folder(linear_rig()), Board::new(7));
-    fs::write(folder.path().join("presses.csv"), board.calibration(48)).unwrap();
+    fs::write(folder.path().join("presses.csv"), board.calibration(72)).unwrap();
     said(&run(folder.path(), &["fit", "rig.toml", "--data", "presses.csv", "-o", "board.json"]));
     (folder, board)
 }
@@ -238,8 +238,8 @@ fn bad_tares_are_refused() {
 /// A recording of presses whose offsets move in the course of it, some of its untouched rows without position and force.
 fn drifting(board: &mut Board) -> String {
     let mut csv = String::new();
-    for part in 0..12 {
-        board.move_steadily(3.0);
+    for part in 0..8 {
+        board.move_steadily(4.5);
         let place_mm = |i: i32| 15.0 + 18.0 * f64::from((5 * part + i) % 16);
         let mut touches: Vec<Touch> = (0..5)
             .map(|i| Touch { position_mm: place_mm(i), force_n: 1.0 + f64::from((3 * part + i) % 4) })
@@ -265,7 +265,7 @@ fn held_out_readings_are_judged_without_the_drift_of_the_recording() {
         (mean_mm, json["tared"].as_bool().unwrap(), String::from_utf8(output.stderr).unwrap())
     };
     let (raw_mm, _, warned) = mean_mm(&["evaluate"]);
-    assert!(warned.contains("drift.csv: 12 rows without a position, taken as untouched"), "{warned}");
+    assert!(warned.contains("drift.csv: 8 rows without a position, taken as untouched"), "{warned}");
     assert!(warned.contains("`--tare auto` subtracts it"), "{warned}");
     let (tared_mm, tared, told) = mean_mm(&["evaluate", "--tare", "auto"]);
     assert!(tared && told.contains("it is subtracted from held-out readings"), "{told}");
@@ -277,7 +277,7 @@ fn held_out_readings_are_judged_without_the_drift_of_the_recording() {
         complained(&run(folder.path(), &["evaluate", "rig.toml", "--data", "drift.csv", "--tare", "5"]), 2);
     assert!(refused.contains("--tare auto subtracts the drift"), "{refused}");
     // `auto` judges likewise.
-    file("auto.toml", &RIG.replace("\"influence\"", "\"auto\""));
+    file("auto.toml", &RIG.replace("\"influence\"", "\"auto\"\nonly = [\"influence\", \"neighbours\"]"));
     let options = ["--data", "drift.csv", "--time-limit", "30 s", "-o", "auto.json"];
     let fit = run(folder.path(), &[&["fit", "auto.toml"][..], &options].concat());
     let chosen = String::from_utf8(fit.stderr).unwrap();
@@ -367,7 +367,7 @@ fn a_calibration_by_the_latest_zero_is_used_by_it() {
     let rig = linear_rig().replacen("[recording]", "[recording]\nzero = \"last\"", 1);
     assert_ne!(rig, linear_rig());
     fs::write(folder.path().join("rig.toml"), rig).unwrap();
-    fs::write(folder.path().join("presses.csv"), board.calibration(48)).unwrap();
+    fs::write(folder.path().join("presses.csv"), board.calibration(72)).unwrap();
     said(&run(folder.path(), &["fit", "rig.toml", "--data", "presses.csv", "-o", "board.json"]));
     let touches = touches(&mut board);
     fs::write(folder.path().join("touches.csv"), board.recording(&touches)).unwrap();

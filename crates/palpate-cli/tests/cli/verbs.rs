@@ -104,10 +104,14 @@ fn the_water_recording_is_cross_validated_by_position() {
     assert!(mean_mm < 1.0, "{found}");
     assert!(folder.path().join("report/report.html").exists());
 
-    said(&run(folder.path(), &["fit", "rig.toml", "--data", &data, "-o", "water.json"]));
+    // A third of the rows, with all 41 places.
+    let recording = fs::read_to_string(&data).unwrap();
+    let third: Vec<&str> = recording.lines().step_by(3).collect();
+    fs::write(folder.path().join("third.csv"), third.join("\n")).unwrap();
+    said(&run(folder.path(), &["fit", "rig.toml", "--data", "third.csv", "-o", "water.json"]));
     let located = said(&run(folder.path(), &["locate", "water.json", &data]));
     assert_eq!(located.lines().count(), 780);
-    let same = run(folder.path(), &["evaluate", "water.json", "--data", &data]);
+    let same = run(folder.path(), &["evaluate", "water.json", "--data", "third.csv"]);
     assert!(String::from_utf8_lossy(&same.stderr).contains("fitted to this recording"));
 }
 

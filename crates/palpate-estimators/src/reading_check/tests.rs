@@ -187,7 +187,7 @@ fn a_gaussian_process_is_as_good_at_other_forces() {
 #[test]
 fn own_intervals_stand_where_they_are_shorter() {
     let Some((setup, recording)) = crate::fixtures::sheet_recording() else { return };
-    let few: Vec<usize> = thinned(recording.rows.len(), 500).collect();
+    let few: Vec<usize> = thinned(recording.rows.len(), 200).collect();
     let recording = recording.subset(&few);
     let task = FitTask::new(&setup, &recording);
     let locator = Estimator::GaussianProcess(GaussianProcessEstimator::default())
