@@ -1,7 +1,7 @@
 //! Memory and time of a fit.
 //!
 //! Times are for one busy core; `cargo bench -p palpate --bench cost` measures them
-//! (docs/validation/tables/cost.md).
+//! (docs/validation/speeds.md).
 
 use super::auto::compared_rows;
 use super::{CHOICE_FOLDS, Estimator, is_learnt};

@@ -123,17 +123,17 @@ fn not_excluded(search: &Search, whitened: &[[f64; 8]], minima: &[Minimum]) -> O
 }
 
 fn write_competing(search: &Search, minima: &[Minimum], misfits: &[f64; COARSE], estimate: &mut Estimate) {
-    let shares = shares(minima, search.table.length_m);
+    let shares = shares(search, minima);
     let x_95_m = interval(search, minima, &shares, misfits);
-    estimate.contact = contact(search, &minima[0], x_95_m);
+    let mut ranks: [usize; MOST_MINIMA] = std::array::from_fn(|i| i);
+    ranks.sort_by(|a, b| shares[*b].total_cmp(&shares[*a]));
+    estimate.contact = contact(search, &minima[ranks[0]], x_95_m);
     estimate.status = Status::Located;
-    for (minimum, share) in minima.iter().zip(&shares).skip(1) {
-        if *share >= OTHER_PLACE {
-            let alone = single_interval(minimum, search.table.length_m);
-            let mode = Mode { contact: contact(search, minimum, alone), probability: *share };
-            estimate.modes.push(mode);
-            estimate.status = Status::Ambiguous;
-        }
+    for i in ranks[1..minima.len()].iter().copied().filter(|i| shares[*i] >= OTHER_PLACE) {
+        let alone = single_interval(&minima[i], search.table.length_m);
+        let mode = Mode { contact: contact(search, &minima[i], alone), probability: shares[i] };
+        estimate.modes.push(mode);
+        estimate.status = Status::Ambiguous;
     }
 }
 
@@ -151,16 +151,18 @@ fn contact(search: &Search, minimum: &Minimum, x_95_m: (f64, f64)) -> ContactEst
 }
 
 /// Probabilities by Laplace's approximation within the ends.
-fn shares(minima: &[Minimum], length_m: f64) -> [f64; MOST_MINIMA] {
+fn shares(search: &Search, minima: &[Minimum]) -> [f64; MOST_MINIMA] {
     let mut shares = [0.0; MOST_MINIMA];
     if minima.len() == 1 {
         shares[0] = 1.0;
         return shares;
     }
-    let best = minima[0].misfit;
+    let length_m = search.table.length_m;
+    let cost = |minimum: &Minimum| minimum.misfit + search.log_determinant(minimum.x_m, minimum.force_n);
+    let best = cost(&minima[0]);
     for (share, minimum) in shares.iter_mut().zip(minima) {
         let sd_m = minimum.covariance[0].sqrt().min(length_m);
-        *share = (0.5 * (best - minimum.misfit)).exp() * sd_m * mass(minimum.x_m, sd_m, length_m);
+        *share = (0.5 * (best - cost(minimum))).exp() * sd_m * mass(minimum.x_m, sd_m, length_m);
     }
     let sum: f64 = shares.iter().sum();
     shares.map(|share| share / sum)

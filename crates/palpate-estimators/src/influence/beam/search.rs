@@ -95,6 +95,13 @@ impl Search {
         Some((*lowest, floor.fold(f64::INFINITY, f64::min)))
     }
 
+    /// Log determinant of the channels' covariance, over the noise's.
+    pub fn log_determinant(&self, x_m: f64, force_n: f64) -> f64 {
+        let cell = self.table.cell(x_m);
+        let weight = self.gauss_newton.weights_at(&cell, force_n);
+        -(0..self.table.sensors).map(|channel| weight(channel).ln()).sum::<f64>()
+    }
+
     #[inline(always)]
     pub fn is_explained(&self, whitened: &[[f64; 8]], minimum: &Minimum) -> bool {
         self.rule.is_explained(minimum.misfit) && !self.is_spread(whitened, minimum)

@@ -1,6 +1,8 @@
-//! Comparison with an exhaustive search over two thousand places.
+//! Comparison with an exhaustive search and with an exhaustive integration over two thousand places.
 
 use super::{clean, fit, noisy};
+use crate::arrangement::Training;
+use crate::fit::Locate;
 use crate::fixtures::paper;
 use crate::influence::Influence;
 use crate::influence::beam::gauss_newton::Minimum;
@@ -8,6 +10,7 @@ use crate::influence::beam::search::Search;
 use crate::influence::config::ForceBelief;
 use crate::influence::{InfluenceTable, Scratch};
 use crate::setup::Setup;
+use palpate_core::Status;
 use palpate_numerics::simd::Array;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -117,4 +120,51 @@ fn the_lowest_misfit_is_found_in_odd_readings() {
             }
         }
     }
+}
+
+/// Shares of the posterior probability of places, split at the middles between `modes_m`.
+fn exhaustive_shares(search: &Search, whitened: &[f64], modes_m: &[f64]) -> Vec<f64> {
+    let places = (InfluenceTable::NODES - 1) * PARTS;
+    let (best, _) = exhaustive(search, whitened);
+    let mut shares = vec![0.0; modes_m.len()];
+    for i in 0..=places {
+        let x_m = search.table.length_m * i as f64 / places as f64;
+        let distance = |mode: &usize| (modes_m[*mode] - x_m).abs();
+        let nearest = (0..modes_m.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
+        shares[nearest] += (0.5 * (best - cost(search, whitened, x_m, None))).exp();
+    }
+    let all: f64 = shares.iter().sum();
+    shares.iter().map(|share| share / all).collect()
+}
+
+#[test]
+fn modes_have_the_probabilities_of_an_exhaustive_integration() {
+    // Two sensors near the middle hardly tell the halves apart, and six presses leave uncertain functions.
+    let bench = paper(20e-6, 1);
+    let recording = bench.setup.simulate(&Training::even(6), 3).unwrap();
+    let mut locator = fit(Influence::default(), &bench.setup, &recording);
+    [0, 1, 2, 5, 6, 7].iter().for_each(|channel| assert!(locator.leave_out(*channel)));
+    let search = locator.search();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
+    let mut ambiguous = 0;
+    for x_m in (150..250).map(|mm| 1e-3 * f64::from(mm)) {
+        let reading = noisy(&bench.setup, &[(x_m, 3.0)], &mut rng);
+        let estimate = locator.locate(&reading);
+        let modes = estimate.modes.as_slice();
+        if estimate.status != Status::Ambiguous {
+            continue;
+        }
+        ambiguous += 1;
+        let others = modes.iter().map(|mode| mode.contact.position.x_m);
+        let modes_m: Vec<f64> = std::iter::once(estimate.contact.position.x_m).chain(others).collect();
+        let shares = exhaustive_shares(search, &found(search, &reading).1, &modes_m);
+        let probabilities: Vec<f64> = modes.iter().map(|mode| mode.probability).collect();
+        let first = 1.0 - probabilities.iter().sum::<f64>();
+        // Laplace's approximation of modes that are three standard deviations apart.
+        for (share, probability) in shares.iter().zip(std::iter::once(first).chain(probabilities)) {
+            assert!((share - probability).abs() < 0.05, "{x_m} m: {shares:?}, {estimate:?}");
+        }
+        assert!(modes.iter().all(|mode| mode.probability <= first + 1e-9), "{x_m} m: {estimate:?}");
+    }
+    assert!(ambiguous >= 10, "{ambiguous}");
 }
