@@ -10,7 +10,7 @@ fuzz_target!(|bytes: &[u8]| {
         Hints { position: Some("1".to_owned()), force: Some("2".to_owned()), ..Hints::default() },
     ];
     for hints in hints {
-        let Ok(first) = FirstRig::guess("fuzz \"file\"\n.csv", bytes, &hints) else { continue };
+        let Ok(first) = FirstRig::infer("fuzz \"file\"\n.csv", bytes, &hints) else { continue };
         let rig = Rig::from_toml(&first.to_toml("a\u{7f}b")).expect("a rig that was guessed loads");
         let recording = rig.setup.read_recording("fuzz", bytes).expect("its recording is read");
         assert!(recording.rows.iter().all(|row| row.reading.iter().all(|value| value.is_finite())));

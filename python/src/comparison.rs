@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use palpate::estimators::estimator::{
     self, CompareOptions, Comparison, UnknownEstimator, compare as compare_all, contenders, select,
-    take_off_drift,
+    subtract_drift,
 };
 use palpate::estimators::evaluation::{self, Calibration, ErrorSummary, Split, evaluate_splits, limit_ratio};
 use palpate::estimators::fit::FitTask;
@@ -18,7 +18,7 @@ use std::sync::Arc;
 use crate::bench::{Recording, Setup};
 use crate::errors::{of_work, refused};
 use crate::estimator::{Estimator, check_memory};
-use crate::evaluation::{About, Evaluation, FIGURES};
+use crate::evaluation::{Evaluation, EvaluationOrigin, FIGURES};
 use crate::quantities::{self, length_m};
 use crate::training::Training;
 use crate::values::Fields;
@@ -35,7 +35,7 @@ fn folds(
     let recording = recording.clone().in_order();
     let mut splits = Split::by_folds(&recording, count)?;
     if tare {
-        take_off_drift(setup, &mut splits, watch)?;
+        subtract_drift(setup, &mut splits, watch)?;
     }
     Ok(splits)
 }
@@ -74,7 +74,7 @@ pub fn cross_validate(
         Ok::<_, Box<dyn std::error::Error + Send + Sync>>(tried.evaluation)
     })?;
     let evaluation = tried.map_err(|error| of_work(&*error))?;
-    let about = About {
+    let about = EvaluationOrigin {
         kind: method.kind().to_owned(),
         source: recording.inner.provenance.source.clone(),
         how: in_folds(count, tare),
@@ -172,7 +172,7 @@ pub fn compare<'py>(
         let clock = || start.elapsed().as_secs_f64();
         let options = CompareOptions { seed, clock: &clock, refuse: &refuse, watch };
         let compared = compare_all(bench, contenders, &trials, options)?;
-        let evaluations = compared.comparisons.iter().map(|one| &one.tried.evaluation);
+        let evaluations = compared.comparisons.iter().map(|one| &one.timed.evaluation);
         let ratios: Vec<Option<f64>> = evaluations.map(|of| limit_ratio(bench, of)).collect();
         Ok::<_, Cancelled>((compared, ratios))
     })?;
@@ -184,9 +184,10 @@ pub fn compare<'py>(
     let comparisons = &compared.comparisons;
     columns(&fields, comparisons, tolerance_m)?;
     fields.column("limit_ratio", ratios)?;
-    let about = |kind: &str| About { kind: kind.to_owned(), source: source.clone(), how: how.clone() };
-    let evaluations = comparisons.iter().map(|Comparison { estimator, tried }| {
-        Evaluation::new(tried.evaluation.clone(), Arc::clone(&setup.0), about(estimator.name()))
+    let about =
+        |kind: &str| EvaluationOrigin { kind: kind.to_owned(), source: source.clone(), how: how.clone() };
+    let evaluations = comparisons.iter().map(|Comparison { estimator, timed }| {
+        Evaluation::new(timed.evaluation.clone(), Arc::clone(&setup.0), about(estimator.name()))
     });
     fields.set(
         "evaluations",
@@ -196,7 +197,7 @@ pub fn compare<'py>(
         )?,
     )?;
     let left_out = PyDict::new(py);
-    for (kind, why) in &compared.left_out {
+    for (kind, why) in &compared.omitted {
         left_out.set_item(kind, why)?;
     }
     fields.set("left_out", left_out)?;
@@ -205,13 +206,13 @@ pub fn compare<'py>(
 
 fn columns(fields: &Fields<'_>, comparisons: &[Comparison], tolerance_m: f64) -> PyResult<()> {
     let summaries: Vec<Option<ErrorSummary>> =
-        comparisons.iter().map(|comparison| comparison.tried.evaluation.summary(None)).collect();
+        comparisons.iter().map(|comparison| comparison.timed.evaluation.summary(None)).collect();
     fields
         .set("names", comparisons.iter().map(|comparison| comparison.estimator.name()).collect::<Vec<_>>())?;
     for (name, of) in FIGURES {
         fields.column(name, summaries.iter().map(|errors| errors.as_ref().map(of)))?;
     }
-    let evaluations = || comparisons.iter().map(|comparison| &comparison.tried.evaluation);
+    let evaluations = || comparisons.iter().map(|comparison| &comparison.timed.evaluation);
     let share = |percent: f64| percent / 100.0;
     fields
         .column("effective_length", evaluations().map(|of| Some(share(of.effective_percent(tolerance_m)))))?;
@@ -220,7 +221,7 @@ fn columns(fields: &Fields<'_>, comparisons: &[Comparison], tolerance_m: f64) ->
     let forces = || evaluations().map(evaluation::Evaluation::force_summary);
     fields.column("force_mean", forces().map(|forces| Some(forces?.average_n)))?;
     fields.column("force_coverage", forces().map(|forces| Some(share(forces?.coverage_percent))))?;
-    fields.column("fit_seconds", comparisons.iter().map(|comparison| Some(comparison.tried.fit_seconds)))?;
-    let locate_s = |comparison: &Comparison| Some(1e-9 * comparison.tried.locate_ns);
+    fields.column("fit_seconds", comparisons.iter().map(|comparison| Some(comparison.timed.fit_seconds)))?;
+    let locate_s = |comparison: &Comparison| Some(1e-9 * comparison.timed.locate_ns);
     fields.column("locate_seconds", comparisons.iter().map(locate_s))
 }

@@ -235,7 +235,7 @@ impl SeedQueue<estimator::Locator> for Seeds<'_> {
 fn choice_dict<'py>(py: Python<'py>, choice: &Choice) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("best", choice.best.name())?;
-    let tried = choice.tried.iter().map(|tried| {
+    let tried = choice.candidates.iter().map(|tried| {
         let one = PyDict::new(py);
         one.set_item("name", &tried.name)?;
         one.set_item("mean_error", tried.mean_error_m)?;
@@ -244,6 +244,6 @@ fn choice_dict<'py>(py: Python<'py>, choice: &Choice) -> PyResult<Bound<'py, PyD
         Ok(one)
     });
     dict.set_item("tried", tried.collect::<PyResult<Vec<_>>>()?)?;
-    dict.set_item("left_out", choice.left_out.iter().cloned().collect::<std::collections::BTreeMap<_, _>>())?;
+    dict.set_item("left_out", choice.omitted.iter().cloned().collect::<std::collections::BTreeMap<_, _>>())?;
     Ok(dict)
 }

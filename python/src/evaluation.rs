@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use palpate::estimators::estimator::Status;
 use palpate::estimators::evaluation::{
-    self, ErrorSummary, Located, LocatedForce, Portion, limit_ratio, percentage_error,
+    self, ErrorSummary, EvaluatedContact, LocatedForce, Portion, limit_ratio, percentage_error,
 };
 use palpate::estimators::setup;
 use palpate::mechanics::contact::Position;
@@ -23,7 +23,7 @@ use crate::values::Fields;
 pub struct Evaluation {
     inner: evaluation::Evaluation,
     setup: Arc<setup::Setup>,
-    about: About,
+    about: EvaluationOrigin,
 }
 
 /// Figures by name, in metres.
@@ -38,7 +38,7 @@ pub const FIGURES: [(&str, Figure); 5] = [
 pub type Figure = fn(&ErrorSummary) -> f64;
 
 #[derive(Clone)]
-pub struct About {
+pub struct EvaluationOrigin {
     pub kind: String,
     pub source: String,
     /// Use of the recording.
@@ -46,7 +46,7 @@ pub struct About {
 }
 
 impl Evaluation {
-    pub fn new(inner: evaluation::Evaluation, setup: Arc<setup::Setup>, about: About) -> Self {
+    pub fn new(inner: evaluation::Evaluation, setup: Arc<setup::Setup>, about: EvaluationOrigin) -> Self {
         Self { inner, setup, about }
     }
 
@@ -66,7 +66,7 @@ impl Evaluation {
         fields.column("error", located().map(|located| Some(located.error_m())))?;
         fields.column("covered", located().map(|located| located.covered.map(f64::from)))?;
         fields.column("interval_score", located().map(|located| located.interval_score_m))?;
-        let force = |located: &Located| located.force.map(|force| force.estimate_n);
+        let force = |located: &EvaluatedContact| located.force.map(|force| force.estimate_n);
         fields.column("estimated_force", located().map(force))?;
         Ok(fields.into_dict())
     }
@@ -333,7 +333,7 @@ impl Evaluation {
     }
 
     fn __repr__(&self) -> String {
-        let About { kind, source, how } = &self.about;
+        let EvaluationOrigin { kind, source, how } = &self.about;
         let errors = self.inner.summary(None).map_or_else(String::new, |errors| {
             format!(
                 ": mean error {} mm, median {} mm, largest {} mm",
@@ -353,7 +353,7 @@ impl Evaluation {
         let py = slf.py();
         let own = slf.get();
         let setup = serde_json::to_vec(&*own.setup).map_err(refused)?;
-        let About { kind, source, how } = own.about.clone();
+        let EvaluationOrigin { kind, source, how } = own.about.clone();
         let located: Vec<PackedContact> = own.inner.located.iter().map(packed).collect();
         let rebuild = py.import("palpate._palpate")?.getattr("Evaluation")?.getattr("_unpickle")?;
         let setup = pyo3::types::PyBytes::new(py, &setup);
@@ -370,7 +370,7 @@ impl Evaluation {
         let (kind, source, how) = about;
         let located = located.into_iter().map(unpacked).collect();
         let inner = evaluation::Evaluation { extent: setup.surface().extent(), located };
-        Ok(Self { inner, setup: Arc::new(setup), about: About { kind, source, how } })
+        Ok(Self { inner, setup: Arc::new(setup), about: EvaluationOrigin { kind, source, how } })
     }
 }
 
@@ -384,17 +384,19 @@ fn figure(value: f64) -> String {
 type PackedContact =
     ((f64, f64), Option<f64>, (f64, f64), Option<bool>, Option<f64>, Option<usize>, Option<(f64, bool)>);
 
-fn packed(located: &Located) -> PackedContact {
-    let Located { truth, force_n, estimate, covered, interval_score_m, status, force } = *located;
+fn packed(located: &EvaluatedContact) -> PackedContact {
+    let EvaluatedContact { truth, force_n, estimate, covered, interval_score_m, status, force } = *located;
     let status = status.and_then(|status| Status::ALL.iter().position(|of| *of == status));
     let force = force.map(|force| (force.estimate_n, force.covered));
     ((truth.x_m, truth.y_m), force_n, (estimate.x_m, estimate.y_m), covered, interval_score_m, status, force)
 }
 
-fn unpacked((truth, force_n, estimate, covered, interval_score_m, status, force): PackedContact) -> Located {
+fn unpacked(
+    (truth, force_n, estimate, covered, interval_score_m, status, force): PackedContact,
+) -> EvaluatedContact {
     let position = |(x_m, y_m)| Position { x_m, y_m };
     let force = force.map(|(estimate_n, covered)| LocatedForce { estimate_n, covered });
-    Located {
+    EvaluatedContact {
         truth: position(truth),
         force_n,
         estimate: position(estimate),

@@ -1,7 +1,7 @@
 //! Cramér–Rao bound of a bench.
 
+use palpate::estimators::detectable_force::{DetectableForce, TouchSummary};
 use palpate::estimators::influence::Influence;
-use palpate::estimators::lightest_touch::{LightestTouch, TouchSummary};
 use palpate::estimators::setup;
 use palpate::estimators::status::FalseAlarmRate;
 use palpate::mechanics::contact::{OffSurface, Position};
@@ -72,7 +72,7 @@ pub fn limit<'py>(
     let force_n =
         force_n.ok_or_else(|| refused(format!("{}: give `force`, as in \"3 N\"", LimitError::NoForce)))?;
     let force = if unknown_force || setup.force_n().is_none() { Force::Unknown } else { Force::Known };
-    let asked = Asked { force_n, force, at, rate };
+    let asked = LimitRequest { force_n, force, at, rate };
     if let (Some(limit), Some(surface)) = (memory_limit, setup.surface().model()) {
         let listed = asked.at.as_ref().map_or(0, Vec::len);
         let cost = CramerRaoBound::cost(surface, setup.layout(), listed);
@@ -84,18 +84,18 @@ pub fn limit<'py>(
     }
     let told = work::run_with(py, progress, None, |watch| match &subject {
         Subject::Locator(locator) if let Some(linear) = locator.force_linear() => {
-            let touch = locator.beyond_scatter(linear.lightest_touch());
-            asked.tell(&linear.cramer_rao_bound(extent), &touch, watch)
+            let touch = locator.add_scatter(linear.lightest_touch());
+            asked.compute(&linear.cramer_rao_bound(extent), &touch, watch)
         }
         _ => {
             let limit = setup.cramer_rao_bound_watched(watch)?;
             let touch = Influence { false_alarm_rate: asked.rate, ..Influence::default() };
             let touch = touch.lightest_touch(&limit);
             let touch = match &subject {
-                Subject::Locator(locator) => locator.beyond_scatter(touch),
+                Subject::Locator(locator) => locator.add_scatter(touch),
                 _ => touch,
             };
-            asked.tell(&limit, &touch, watch)
+            asked.compute(&limit, &touch, watch)
         }
     })?;
     let told = told.map_err(|error| complaint(&error))?;
@@ -116,7 +116,7 @@ fn complaint(error: &LimitError) -> PyErr {
 
 const TOGETHER: usize = 500;
 
-struct Asked {
+struct LimitRequest {
     force_n: f64,
     force: Force,
     /// The whole surface for `None`.
@@ -124,7 +124,7 @@ struct Asked {
     rate: FalseAlarmRate,
 }
 
-struct Told {
+struct LimitResult {
     alive: usize,
     known: LimitCurve,
     unknown: LimitCurve,
@@ -134,8 +134,13 @@ struct Told {
     touches: [Option<TouchSummary>; 2],
 }
 
-impl Asked {
-    fn tell(&self, limit: &CramerRaoBound, touch: &LightestTouch, watch: Watch) -> Result<Told, LimitError> {
+impl LimitRequest {
+    fn compute(
+        &self,
+        limit: &CramerRaoBound,
+        touch: &DetectableForce,
+        watch: Watch,
+    ) -> Result<LimitResult, LimitError> {
         limit.prepare(self.at.as_deref().unwrap_or_default(), watch)?;
         let curve = |force| match &self.at {
             Some(at) => {
@@ -157,8 +162,8 @@ impl Asked {
             watch.counted("lightest touch", "positions", touch_n.len(), positions.len())?;
             touch_n.extend(at.iter().map(|at| touch.forces_at(*at)));
         }
-        Ok(Told {
-            alive: limit.alive(),
+        Ok(LimitResult {
+            alive: limit.enabled_count(),
             known,
             unknown,
             warnings: limit_warnings(limit, self.force_n, self.force, watch)?,
@@ -169,11 +174,11 @@ impl Asked {
     }
 }
 
-impl Told {
+impl LimitResult {
     fn fields<'py>(
         &self,
         py: Python<'py>,
-        asked: &Asked,
+        asked: &LimitRequest,
         setup: &setup::Setup,
     ) -> PyResult<Bound<'py, PyDict>> {
         let extent = setup.surface().extent();
@@ -223,8 +228,8 @@ fn of_summary(summary: &LimitSummary, curve: &LimitCurve, extent: Extent) -> Val
         "least_at": place(summary.best.0, extent),
         "largest": summary.worst.1,
         "largest_at": place(summary.worst.0, extent),
-        "positions_without": summary.without,
-        "share_without": summary.without as f64 / curve.points.len() as f64,
+        "positions_without": summary.unidentifiable,
+        "share_without": summary.unidentifiable as f64 / curve.points.len() as f64,
     })
 }
 
@@ -234,7 +239,7 @@ fn of_touch(touch: &TouchSummary, extent: Extent) -> Value {
         "median": touch.median_n,
         "largest": touch.worst.1,
         "largest_at": place(touch.worst.0, extent),
-        "positions_without": touch.without,
+        "positions_without": touch.undetected,
     })
 }
 

@@ -45,29 +45,29 @@ pub fn load_profile<'py>(
             Subject::Locator(locator) => locator.load_sensors_watched(watch),
             other => LoadSensors::from_setup_watched(other.setup(), watch),
         };
-        let profiler = Profiler::new(sensors.map_err(Refused::Sensors)?);
+        let profiler = Profiler::new(sensors.map_err(ProfileFailure::Sensors)?);
         let of_truth = patch_limits(profiler.sensors(), &truth);
         let rows = values.chunks_exact(channels).enumerate();
         let each = rows.map(|(i, reading)| {
             watch.counted("estimating loads", "readings", i, values.len() / channels)?;
-            let profile = profiler.profile(reading).map_err(|error| Refused::Reading(i, error))?;
+            let profile = profiler.profile(reading).map_err(|error| ProfileFailure::Reading(i, error))?;
             let extent = profiler.cells().extent;
             let patches: Vec<UniformLoad> =
                 profile.patches.iter().map(|patch| patch.as_load(extent)).collect();
-            Ok(Told {
+            Ok(ProfileResult {
                 limits: patch_limits(profiler.sensors(), &patches),
                 resolution: profiler.resolution(&profile),
                 profile,
                 truth_limits: of_truth.clone(),
             })
         });
-        each.collect::<Result<Vec<_>, Refused>>()
+        each.collect::<Result<Vec<_>, ProfileFailure>>()
     })?;
     let told = told.map_err(|error| match error {
-        Refused::Sensors(error) => complaint(&error),
-        Refused::Reading(_, error) if one => refused(error),
-        Refused::Reading(row, error) => refused(format!("readings[{row}]: {error}")),
-        Refused::Cancelled(cancelled) => of_work(&cancelled),
+        ProfileFailure::Sensors(error) => complaint(&error),
+        ProfileFailure::Reading(_, error) if one => refused(error),
+        ProfileFailure::Reading(row, error) => refused(format!("readings[{row}]: {error}")),
+        ProfileFailure::Cancelled(cancelled) => of_work(&cancelled),
     })?;
     let profiles = told.iter().map(|told| told.fields(py, &truth)).collect::<PyResult<Vec<_>>>()?;
     let profiles = PyList::new(py, profiles)?;
@@ -107,14 +107,14 @@ fn uniform_loads(text: &str, setup: &setup::Setup) -> PyResult<Vec<UniformLoad>>
     loads.map_err(|error| of_rig(&error, "load", text))
 }
 
-enum Refused {
+enum ProfileFailure {
     Sensors(LoadSensorsError),
     /// Index of a reading, and the error.
     Reading(usize, ReadingError),
     Cancelled(palpate::numerics::watch::Cancelled),
 }
 
-impl From<palpate::numerics::watch::Cancelled> for Refused {
+impl From<palpate::numerics::watch::Cancelled> for ProfileFailure {
     fn from(cancelled: palpate::numerics::watch::Cancelled) -> Self {
         Self::Cancelled(cancelled)
     }
@@ -129,20 +129,20 @@ fn complaint(error: &LoadSensorsError) -> PyErr {
     refused(format!("{error}: {help}"))
 }
 
-struct Told {
+struct ProfileResult {
     profile: LoadProfile,
     limits: Option<Vec<PatchLimit>>,
     truth_limits: Option<Vec<PatchLimit>>,
     resolution: Option<Resolution>,
 }
 
-impl Told {
+impl ProfileResult {
     fn fields<'py>(&self, py: Python<'py>, truth: &[UniformLoad]) -> PyResult<Bound<'py, PyDict>> {
         let profile = &self.profile;
         let extent = profile.cells.extent;
         let fields = Fields::new(py);
         fields.set("status", profile.status.name())?;
-        fields.set("misfit", profile.misfit)?;
+        fields.set("misfit", profile.chi_squared)?;
         fields.set("worst_misfit", profile.worst_misfit)?;
         fields.set("total", profile.total_n)?;
         fields.set("total_sd", profile.total_sd_n)?;

@@ -17,7 +17,7 @@ use crate::arrays::{self, Readings};
 use crate::bench::{Recording, Setup};
 use crate::errors::{io_error, of_locator, refused};
 use crate::estimates::{Estimate, Estimates};
-use crate::evaluation::{About, Evaluation};
+use crate::evaluation::{Evaluation, EvaluationOrigin};
 use crate::files::write_whole;
 use crate::influence;
 use crate::methods;
@@ -189,7 +189,7 @@ impl Locator {
         })?;
         let source = judged.provenance.source.clone();
         let located = if tare.is_some() { "located, tared" } else { "located" };
-        let about = About { kind: self.kind().to_owned(), source, how: located.to_owned() };
+        let about = EvaluationOrigin { kind: self.kind().to_owned(), source, how: located.to_owned() };
         Ok(Evaluation::new(evaluation, self.setup.clone(), about))
     }
 

@@ -4,8 +4,8 @@ use std::error::Error;
 use std::sync::Arc;
 
 use palpate::design::sensors::{
-    Assessment, CountPoint, Designed, Method, SensorDesign, SensorProblem, Verification, best_design, enough,
-    to_verify,
+    AssessedLayout, Assessment, CountPoint, Method, SensorDesign, SensorProblem, Verification, best_design,
+    enough, to_verify,
 };
 use palpate::estimators::influence::Influence;
 use palpate::estimators::{estimator, setup};
@@ -90,8 +90,8 @@ pub fn place_sensors<'py>(
             refused(format!("{error}: raise the limit, or set `sites` or the contacts' `every` wider apart"))
         })?;
     }
-    let asked = Asked { setup, design, method, counts, verify, estimator, seed };
-    let found = work::run_with(py, progress, None, |watch| asked.answer(watch))?;
+    let asked = DesignRequest { setup, design, method, counts, verify, estimator, seed };
+    let found = work::run_with(py, progress, None, |watch| asked.compute(watch))?;
     found.map_err(|error| of_work(&*error))?.fields(py, &asked)
 }
 
@@ -111,7 +111,7 @@ fn named(name: &str) -> PyResult<Method> {
     })
 }
 
-struct Asked {
+struct DesignRequest {
     setup: setup::Setup,
     design: SensorDesign,
     method: Option<Method>,
@@ -121,21 +121,21 @@ struct Asked {
     seed: u64,
 }
 
-struct Found {
+struct DesignResult {
     force_n: f64,
     force: Force,
     candidates: usize,
     contacts: Vec<Position>,
     weights: Vec<f64>,
-    designed: Vec<Designed>,
+    designed: Vec<AssessedLayout>,
     /// True for kept sensors, by layout.
     kept: Vec<Vec<bool>>,
     verified: Vec<(Method, Verification)>,
     counts: Vec<CountPoint>,
 }
 
-impl Asked {
-    fn answer(&self, watch: Watch) -> Result<Found, Box<dyn Error + Send + Sync>> {
+impl DesignRequest {
+    fn compute(&self, watch: Watch) -> Result<DesignResult, Box<dyn Error + Send + Sync>> {
         let problem = SensorProblem::new(&self.setup, &self.design, watch)?;
         let designed = match self.method {
             Some(method) => vec![problem.by_method(method, self.seed, watch)?],
@@ -152,10 +152,10 @@ impl Asked {
                 verified.push((one.method, told));
             }
         }
-        let is_kept = |one: &Designed| {
+        let is_kept = |one: &AssessedLayout| {
             one.layout.sensors().iter().map(|sensor| problem.is_kept(sensor)).collect::<Vec<bool>>()
         };
-        Ok(Found {
+        Ok(DesignResult {
             force_n: problem.force_n(),
             force: problem.force(),
             candidates: problem.candidates(),
@@ -169,8 +169,8 @@ impl Asked {
     }
 }
 
-impl Found {
-    fn fields<'py>(&self, py: Python<'py>, asked: &Asked) -> PyResult<Bound<'py, PyDict>> {
+impl DesignResult {
+    fn fields<'py>(&self, py: Python<'py>, asked: &DesignRequest) -> PyResult<Bound<'py, PyDict>> {
         let extent = asked.setup.surface().extent();
         let fields = Fields::new(py);
         fields.set("force", self.force_n)?;
@@ -200,7 +200,7 @@ impl Found {
         assessments(&fields, "", self.designed.iter().map(|one| Some(&one.assessment)))?;
         let keeps: Vec<bool> = self.designed.iter().map(|one| one.assessment.keeps_constraints).collect();
         fields.set("keeps_constraints", keeps)?;
-        let told = |one: &Designed| self.verified.iter().find(|(method, _)| *method == one.method);
+        let told = |one: &AssessedLayout| self.verified.iter().find(|(method, _)| *method == one.method);
         let simulated = |figure: fn(&Verification) -> f64| {
             self.designed.iter().map(move |one| told(one).map(|(_, told)| figure(told))).collect::<Vec<_>>()
         };

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use palpate::design::positions::{
-    Placed, PositionDesign, PositionProblem, Verification, best_placed, next_press as advise,
+    PositionDesign, PositionProblem, Verification, VerifiedPositions, best_placed, next_press as advise,
 };
 use palpate::estimators::arrangement::{self, Arrangement};
 use palpate::estimators::setup;
@@ -87,7 +87,7 @@ pub fn place_training<'py>(
 fn placed_fields<'py>(
     fields: &Fields<'py>,
     py: Python<'py>,
-    placed: &[Placed],
+    placed: &[VerifiedPositions],
     problem: &PositionProblem,
     force_n: Option<f64>,
 ) -> PyResult<()> {

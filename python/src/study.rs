@@ -7,8 +7,8 @@ use palpate::numerics::simd::InstructionSet;
 use palpate::numerics::watch::Watch;
 use palpate::rig;
 use palpate_studies::{
-    self as studies, ArmOutcome, ArmResults, AssemblyError, Checkpoint, CheckpointError, FitRows,
-    ResultsFile, RunFacts, RunOptions, ShardTables, StudyResults, StudyTables, Task, Trained, paper,
+    self as studies, ArmFit, ArmOutcome, ArmResults, AssemblyError, Checkpoint, CheckpointError, FitRows,
+    ResultsFile, RunFacts, RunOptions, ShardTables, StudyResults, StudyTables, Task, paper,
 };
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -104,7 +104,7 @@ impl PreparedStudy {
         let fitted = work::run_with(py, progress, None, |watch| {
             let tables = StudyTables::new(&self.inner);
             let go_on = |_| lock(failed).is_none() && watch.round().is_ok();
-            let on_trained = |trained: &Trained| {
+            let on_trained = |trained: &ArmFit| {
                 let FitRows { networks, evaluations } = tables.rows(trained);
                 let presented = self.inner.presentations(trained);
                 let told = Python::attach(|py| on_fit.call1(py, (networks, evaluations, presented)));
@@ -161,7 +161,7 @@ impl PreparedStudy {
     fn fields<'py>(
         &self,
         py: Python<'py>,
-        fits: Vec<Trained>,
+        fits: Vec<ArmFit>,
         facts: &RunFacts,
     ) -> PyResult<Bound<'py, PyDict>> {
         let FitRows { networks, evaluations } = StudyTables::new(&self.inner).whole(&fits);
@@ -171,7 +171,7 @@ impl PreparedStudy {
             run: facts,
             results: &results,
             published: self.is_paper.then(|| paper::published_figures(&results)),
-            claims: self.is_paper.then(|| paper::claims(&outcomes, self.inner.judging())),
+            claims: self.is_paper.then(|| paper::claims(&outcomes, self.inner.evaluation_settings())),
         };
         let fields = Fields::new(py);
         fields.set("study", &facts.study)?;

@@ -61,10 +61,10 @@ pub fn edges(surface: &SurfaceSpec) -> Option<[(&'static str, &'static str); 4]>
     let SurfaceSpec::Plate(plate) = surface else { return None };
     let edges = plate.spec().edges;
     let named = [("left", edges.left), ("right", edges.right), ("bottom", edges.bottom), ("top", edges.top)];
-    Some(named.map(|(name, edge)| (name, held(edge))))
+    Some(named.map(|(name, edge)| (name, edge_name(edge))))
 }
 
-fn held(edge: Edge) -> &'static str {
+fn edge_name(edge: Edge) -> &'static str {
     match edge {
         Edge::Simple => "simple",
         Edge::Clamped => "clamped",

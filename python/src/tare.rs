@@ -13,7 +13,7 @@ use crate::work;
 const READINGS_EACH: usize = 256;
 
 #[derive(Debug, thiserror::Error)]
-enum Stopped {
+enum TareFailure {
     #[error("{0}")]
     Tare(#[from] TareError),
     #[error("{0}")]
@@ -43,7 +43,7 @@ pub fn tare<'py>(
         None => check_tells_untouched(locator, "give `untouched`")?,
     }
     let follows = untouched.is_none();
-    let mut taring = |watch: Watch<'_>| -> Result<(), Stopped> {
+    let mut taring = |watch: Watch<'_>| -> Result<(), TareFailure> {
         let slots = values.chunks_exact(channels.len()).zip(tared.chunks_exact_mut(channels.len()));
         for (i, (reading, tared)) in slots.enumerate() {
             if i.is_multiple_of(READINGS_EACH) {
@@ -105,7 +105,7 @@ pub fn tared_recording(
                     }
                     locator.locate_following(&mut taring, &row.reading, &mut tared.reading)?;
                 }
-                Ok::<(), Stopped>(())
+                Ok::<(), TareFailure>(())
             })?;
             return Ok(tared);
         }

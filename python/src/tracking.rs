@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use palpate::estimators::estimator::{self, SmoothTracker, Swing, Track, Tracked, TrackerConfig};
+use palpate::estimators::estimator::{self, SmoothTracker, Swing, Track, TrackedContact, TrackerConfig};
 use palpate::estimators::recording::{self, TimedRecording};
 use palpate::estimators::setup;
 use palpate::estimators::simulate::{MovingContacts, simulate_moving_watched as simulate};
@@ -176,17 +176,19 @@ pub fn track<'py>(
         let likelihood = tracking.likelihood();
         if smooth {
             let mut tracker = SmoothTracker::new(likelihood, config);
-            let take = |time_s: f64, reading: &[f64]| tracker.follow(time_s, reading).map(|()| None);
-            follow(&times_s, readings, watch, take)?;
-            tracker.smoothed(watch).map_err(Stopped::Cancelled)
+            let take = |time_s: f64, reading: &[f64]| tracker.update(time_s, reading).map(|()| None);
+            update_tracks(&times_s, readings, watch, take)?;
+            tracker.smoothed(watch).map_err(TrackingFailure::Cancelled)
         } else {
             let mut tracker = estimator::Tracker::new(likelihood, config);
-            follow(&times_s, readings, watch, |time_s, reading| tracker.follow(time_s, reading).map(Some))
+            update_tracks(&times_s, readings, watch, |time_s, reading| {
+                tracker.update(time_s, reading).map(Some)
+            })
         }
     })?;
     let tracks = tracks.map_err(|error| match error {
-        Stopped::At(row, error) => refused(format!("readings[{row}]: {error}")),
-        Stopped::Cancelled(cancelled) => of_work(&cancelled),
+        TrackingFailure::At(row, error) => refused(format!("readings[{row}]: {error}")),
+        TrackingFailure::Cancelled(cancelled) => of_work(&cancelled),
     })?;
     let fields = track_fields(py, inner, &tracks)?;
     let extent = inner.setup.surface().extent();
@@ -290,7 +292,7 @@ impl Tracker {
         };
         let reading = reading.as_slice()?;
         estimator::ReadingError::check(reading, self.channels.len()).map_err(refused)?;
-        let track = self.inner.follow(time_s, reading).map_err(refused)?;
+        let track = self.inner.update(time_s, reading).map_err(refused)?;
         self.time_s = Some(time_s);
         let module = py.import("palpate._tracking")?;
         let of_contact = module.getattr("ContactState")?;
@@ -314,7 +316,7 @@ impl Tracker {
 }
 
 /// Fields of `palpate.ContactState`.
-fn contact_state<'py>(py: Python<'py>, contact: &Tracked) -> PyResult<Bound<'py, PyDict>> {
+fn contact_state<'py>(py: Python<'py>, contact: &TrackedContact) -> PyResult<Bound<'py, PyDict>> {
     let fields = Fields::new(py);
     let [x_sd, speed_sd, force_sd] = contact.sd;
     for (name, value) in [
@@ -329,7 +331,7 @@ fn contact_state<'py>(py: Python<'py>, contact: &Tracked) -> PyResult<Bound<'py,
     }
     fields.set("x_95", contact.x_95_m)?;
     fields.set("force_95", contact.force_interval_95_n())?;
-    if let Some(across) = contact.across {
+    if let Some(across) = contact.transverse {
         for (name, value) in [
             ("y", across.y_m),
             ("speed_y", across.speed_m_per_s),
@@ -349,28 +351,29 @@ fn truths(recording: &recording::Recording, second: Option<&(Vec<f64>, Vec<f64>)
     TimedRecording { recording: recording.clone(), times_s: Vec::new(), second }.truths()
 }
 
-enum Stopped {
+enum TrackingFailure {
     /// Index of a reading, and the error.
     At(usize, Box<dyn std::error::Error + Send + Sync>),
     Cancelled(Cancelled),
 }
 
-fn follow(
+fn update_tracks(
     times_s: &[f64],
     readings: &[f64],
     watch: Watch,
     mut take: impl FnMut(f64, &[f64]) -> Result<Option<Track>, estimator::TrackError>,
-) -> Result<Vec<Track>, Stopped> {
+) -> Result<Vec<Track>, TrackingFailure> {
     const EVERY: usize = 64;
     let count = times_s.len();
     let channels = readings.len() / count.max(1);
     let mut tracks = Vec::new();
     for (i, (time_s, reading)) in times_s.iter().zip(readings.chunks_exact(channels.max(1))).enumerate() {
         if i.is_multiple_of(EVERY) {
-            watch.counted("following", "readings", i, count).map_err(Stopped::Cancelled)?;
+            watch.counted("following", "readings", i, count).map_err(TrackingFailure::Cancelled)?;
         }
-        estimator::ReadingError::check(reading, channels).map_err(|error| Stopped::At(i, error.into()))?;
-        tracks.extend(take(*time_s, reading).map_err(|error| Stopped::At(i, error.into()))?);
+        estimator::ReadingError::check(reading, channels)
+            .map_err(|error| TrackingFailure::At(i, error.into()))?;
+        tracks.extend(take(*time_s, reading).map_err(|error| TrackingFailure::At(i, error.into()))?);
     }
     Ok(tracks)
 }
@@ -403,7 +406,7 @@ fn track_fields<'py>(
 
 fn contact_fields(fields: &Fields<'_>, tracks: &[Track], at: usize, plane: bool) -> PyResult<()> {
     let contacts = || tracks.iter().map(move |track| track.contacts.get(at));
-    let column = |name: &str, of: fn(&Tracked) -> Option<f64>| {
+    let column = |name: &str, of: fn(&TrackedContact) -> Option<f64>| {
         fields.column(name, contacts().map(|contact| contact.and_then(of)))
     };
     column("x", |contact| Some(contact.x_m))?;
@@ -421,13 +424,13 @@ fn contact_fields(fields: &Fields<'_>, tracks: &[Track], at: usize, plane: bool)
     if !plane {
         return Ok(());
     }
-    column("y", |contact| Some(contact.across?.y_m))?;
-    column("speed_y", |contact| Some(contact.across?.speed_m_per_s))?;
-    column("y_sd", |contact| Some(contact.across?.sd[0]))?;
-    column("speed_y_sd", |contact| Some(contact.across?.sd[1]))?;
-    column("covariance_xy", |contact| Some(contact.across?.covariance_m2))?;
+    column("y", |contact| Some(contact.transverse?.y_m))?;
+    column("speed_y", |contact| Some(contact.transverse?.speed_m_per_s))?;
+    column("y_sd", |contact| Some(contact.transverse?.sd[0]))?;
+    column("speed_y_sd", |contact| Some(contact.transverse?.sd[1]))?;
+    column("covariance_xy", |contact| Some(contact.transverse?.covariance_m2))?;
     let y_95 = contacts().map(|contact| {
-        contact.and_then(|contact| contact.across).map_or([f64::NAN; 2], |across| ends(across.y_95_m))
+        contact.and_then(|contact| contact.transverse).map_or([f64::NAN; 2], |across| ends(across.y_95_m))
     });
     fields.columns("y_95", y_95)
 }

@@ -19,7 +19,7 @@ const SHOW_EVERY: Duration = Duration::from_millis(200);
 const STACK_BYTES: usize = 8 << 20;
 
 #[derive(Clone)]
-struct Latest {
+struct LatestProgress {
     rounds: u64,
     stage: Option<(&'static str, f64, Option<f64>)>,
 }
@@ -65,7 +65,7 @@ pub fn run_with<T: Send>(
     work: impl FnOnce(Watch<'_>) -> T + Send,
 ) -> PyResult<T> {
     let stop = AtomicBool::new(false);
-    let latest = Mutex::new(Latest { rounds: 0, stage: None });
+    let latest = Mutex::new(LatestProgress { rounds: 0, stage: None });
     let observe = |progress: Progress| {
         let mut latest = latest.lock().unwrap_or_else(PoisonError::into_inner);
         latest.stage = match progress {
@@ -87,7 +87,7 @@ pub fn run_with<T: Send>(
             let _done = done;
             work(Watch::new(observe))
         })?;
-        let mut shown = Shown::new(progress, rounds);
+        let mut shown = ProgressDisplay::new(progress, rounds);
         let looked = loop {
             let ended;
             (ended, finished) = py.detach(move || (wait(&finished), finished));
@@ -112,7 +112,7 @@ fn wait(finished: &mpsc::Receiver<()>) -> bool {
     finished.recv_timeout(LOOK) == Err(mpsc::RecvTimeoutError::Disconnected)
 }
 
-struct Shown<'py> {
+struct ProgressDisplay<'py> {
     wanted: Option<Bound<'py, PyAny>>,
     rounds: Option<u64>,
     begun: Instant,
@@ -121,7 +121,7 @@ struct Shown<'py> {
     by: Option<Option<Bound<'py, PyAny>>>,
 }
 
-impl<'py> Shown<'py> {
+impl<'py> ProgressDisplay<'py> {
     fn new(wanted: Option<&Bound<'py, PyAny>>, rounds: Option<u64>) -> Self {
         // A function is called from the beginning.
         let next =
@@ -129,7 +129,7 @@ impl<'py> Shown<'py> {
         Self { wanted: wanted.cloned(), rounds, begun: Instant::now(), next, by: None }
     }
 
-    fn show(&mut self, py: Python<'py>, latest: &Latest) -> PyResult<()> {
+    fn show(&mut self, py: Python<'py>, latest: &LatestProgress) -> PyResult<()> {
         if self.begun.elapsed() < self.next {
             return Ok(());
         }

@@ -49,7 +49,7 @@ pub fn run(root: &Path, arguments: &Arguments) -> Result<bool> {
     fs::write(&lines, "").with_context(|| format!("cannot empty {}", lines.display()))?;
     let mut bench = Command::new("cargo");
     bench.args(["bench", "--workspace"]).args(&arguments.for_cargo);
-    if !run::shown(bench.env(VARIABLE, &lines).current_dir(root))? {
+    if !run::run_shown(bench.env(VARIABLE, &lines).current_dir(root))? {
         return Ok(false);
     }
     let figures = read(&lines)?;
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn the_table_has_medians_ratio_and_what_one_side_lacks() {
+    fn table_has_medians_ratios_and_missing_entries() {
         let table =
             table("base", &figures(&[("fit", 4.0), ("old", 1.0)]), &figures(&[("fit", 5.0), ("added", 2.0)]));
         let expected = "\

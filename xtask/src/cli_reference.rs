@@ -12,5 +12,5 @@ use crate::run;
 pub fn run(root: &Path) -> Result<bool> {
     let mut test = Command::new("cargo");
     test.args(["test", "--quiet", "--package", "palpate-cli", "--test", "cli", "--", "the_page_of_commands"]);
-    run::shown(test.env("PALPATE_WRITE_REFERENCE", "1").current_dir(root))
+    run::run_shown(test.env("PALPATE_WRITE_REFERENCE", "1").current_dir(root))
 }

@@ -12,7 +12,7 @@ use anyhow::{Context, Result};
 use crate::counts::Counts;
 use crate::needs::NODE;
 use crate::run;
-use crate::skipped::{self, STRICT, Skipped, Skips};
+use crate::skipped::{self, STRICT, SkipLog, Skips};
 
 /// Largest uncompressed size of scripts and styles.
 const MOST_BYTES: u64 = 150_000;
@@ -25,7 +25,7 @@ pub fn build(root: &Path) -> Result<bool> {
         println!("{}", NODE.describe());
         return Ok(false);
     }
-    if !(install(root)? && run::shown(&mut npm(root, &["run", "--silent", "build"]))?) {
+    if !(install(root)? && run::run_shown(&mut npm(root, &["run", "--silent", "build"]))?) {
         return Ok(false);
     }
     // Cargo does not see files that did not exist when it compiled the file that includes them.
@@ -51,7 +51,7 @@ pub fn wait(building: Option<Building>) -> Result<bool> {
 }
 
 /// Tests the dashboard in Node and in a browser, in real time: other work delays pages.
-pub fn test(root: &Path, skips: Skips, skipped: &Skipped) -> Result<(bool, Option<Counts>)> {
+pub fn test(root: &Path, skips: Skips, skipped: &SkipLog) -> Result<(bool, Option<Counts>)> {
     if !NODE.is_there(root) {
         println!("{}", NODE.describe());
         return Ok((skips == Skips::Pass, None));
@@ -69,7 +69,7 @@ pub fn test(root: &Path, skips: Skips, skipped: &Skipped) -> Result<(bool, Optio
             Skips::Fail => tests.env(STRICT, "1"),
             Skips::Pass => tests.env_remove(STRICT),
         };
-        let watched = run::watched(&mut tests)?;
+        let watched = run::run_captured(&mut tests)?;
         succeeded &= watched.succeeded;
         counts =
             [counts, Counts::of_vitest(&watched.lines)].into_iter().flatten().reduce(|sum, more| sum + more);
@@ -86,7 +86,7 @@ fn install(root: &Path) -> Result<bool> {
         return Ok(true);
     }
     println!("installing the dashboard's packages");
-    if !run::shown(&mut npm(root, &["ci", "--no-audit", "--no-fund"]))? {
+    if !run::run_shown(&mut npm(root, &["ci", "--no-audit", "--no-fund"]))? {
         return Ok(false);
     }
     fs::write(&stamp, wanted).with_context(|| format!("cannot write {}", stamp.display()))?;

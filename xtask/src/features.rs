@@ -26,7 +26,7 @@ pub fn check(root: &Path) -> Result<bool> {
         let words = arguments.join(" ");
         println!("\n=== {} of {}: cargo check {words}", number + 1, combinations.len());
         let mut cargo = Command::new("cargo");
-        if !run::shown(cargo.args(["check", "--quiet"]).args(arguments).current_dir(root))? {
+        if !run::run_shown(cargo.args(["check", "--quiet"]).args(arguments).current_dir(root))? {
             failed.push(words);
         }
     }

@@ -45,7 +45,7 @@ pub fn run(root: &Path, target: &str, seconds: u32) -> Result<bool> {
     for folder in [&corpus, &artifacts] {
         fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
     }
-    run::shown(
+    run::run_shown(
         Command::new(fuzz.join("target").join(&host).join("release").join(target))
             .arg(format!("-max_total_time={seconds}"))
             .arg(format!("-artifact_prefix={}/", artifacts.display()))
@@ -59,7 +59,7 @@ fn built(root: &Path, target: &str, host: &str) -> Result<bool> {
     command.args(["build", "--release", "--locked", "--manifest-path", "fuzz/Cargo.toml", "--bin", target]);
     command.args(["--target", host, "--target-dir", "fuzz/target"]);
     command.env("RUSTC_BOOTSTRAP", "1").env("CARGO_ENCODED_RUSTFLAGS", FLAGS.join("\u{1f}"));
-    run::shown(command.current_dir(root))
+    run::run_shown(command.current_dir(root))
 }
 
 fn targets(root: &Path) -> Result<Vec<String>> {

@@ -87,7 +87,7 @@ fn main() -> ExitCode {
         Chore::Validate { arguments } => {
             let mut experiment = Command::new("cargo");
             experiment.args(["run", "--quiet", "--package", "palpate-validation", "--"]).args(arguments);
-            run::shown(&mut experiment)
+            run::run_shown(&mut experiment)
         }
         Chore::Features => features::check(&root),
         Chore::Wire => wire::run(&root),
@@ -99,7 +99,7 @@ fn main() -> ExitCode {
         Chore::Man => {
             let mut man = Command::new("cargo");
             man.args(["run", "--quiet", "--package", "palpate-cli", "--", "man", "--out", "target/man"]);
-            run::shown(man.current_dir(&root))
+            run::run_shown(man.current_dir(&root))
         }
         Chore::Tidy => tidy::run(&root),
         Chore::Bench(arguments) => bench::run(&root, &arguments),

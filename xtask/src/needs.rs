@@ -17,11 +17,11 @@ pub struct Need {
     found: fn(&Path, Option<&Path>) -> bool,
     /// Installed by root on Debian.
     packages: &'static [&'static str],
-    pub without: Without,
+    pub without: Fallback,
 }
 
 #[derive(Clone, Copy)]
-pub enum Without {
+pub enum Fallback {
     Skips {
         tests: &'static [&'static str],
         remedy: &'static str,
@@ -33,19 +33,22 @@ pub enum Without {
 pub const NEXTEST: Need = Need {
     name: "cargo-nextest",
     variable: None,
-    found: |_, _| run::answers("cargo", &["nextest", "--version"]),
+    found: |_, _| run::is_runnable("cargo", &["nextest", "--version"]),
     packages: &[],
-    without: Without::FallsBack("cargo test runs the tests instead"),
+    without: Fallback::FallsBack("cargo test runs the tests instead"),
 };
 
 pub const PYTHON: Need = Need {
     name: "Python with venv",
     variable: None,
     found: |_, _| {
-        run::answers("python3", &["-c", "import venv, ensurepip, sys; assert sys.version_info >= (3, 10)"])
+        run::is_runnable(
+            "python3",
+            &["-c", "import venv, ensurepip, sys; assert sys.version_info >= (3, 10)"],
+        )
     },
     packages: &["python3", "python3-venv"],
-    without: Without::Skips {
+    without: Fallback::Skips {
         tests: &["every test of the Python package"],
         remedy: "install Python 3.10 or later with its modules venv and ensurepip",
     },
@@ -55,11 +58,11 @@ pub const NODE: Need = Need {
     name: "Node with npm",
     variable: None,
     found: |_, _| {
-        run::answer("node", &["--version"]).is_some_and(|version| is_recent_node(&version))
-            && run::answers("npm", &["--version"])
+        run::first_line("node", &["--version"]).is_some_and(|version| is_recent_node(&version))
+            && run::is_runnable("npm", &["--version"])
     },
     packages: &["nodejs", "npm"],
-    without: Without::Skips {
+    without: Fallback::Skips {
         tests: &["every test of the dashboard"],
         remedy: "install Node 20.19 or later with npm; without it `palpate serve` has no dashboard",
     },
@@ -74,7 +77,7 @@ const NEEDS: [Need; 7] = [
         variable: Some("PALPATE_DATA"),
         found: |root, named| named.map_or_else(|| root.join("../shared/data").is_dir(), Path::is_dir),
         packages: &[],
-        without: Without::Skips {
+        without: Fallback::Skips {
             tests: &["crates/palpate-cli/tests/cli/recordings.rs", "every test that reads a real recording"],
             remedy: "put it at ../shared/data beside the workspace, or name it in PALPATE_DATA",
         },
@@ -84,7 +87,7 @@ const NEEDS: [Need; 7] = [
         variable: Some("PALPATE_CHROMIUM"),
         found: |_, named| named.unwrap_or(Path::new("/usr/bin/chromium")).is_file(),
         packages: &["chromium", "fonts-dejavu-core"],
-        without: Without::Skips {
+        without: Fallback::Skips {
             tests: &["crates/palpate-cli/tests/cli/browser.rs", "web/browser/dashboard.test.ts"],
             remedy: "install Debian's chromium, or name the program in PALPATE_CHROMIUM",
         },
@@ -94,7 +97,7 @@ const NEEDS: [Need; 7] = [
         variable: Some("PALPATE_MOSQUITTO"),
         found: |_, named| named.unwrap_or(Path::new("/usr/sbin/mosquitto")).is_file(),
         packages: &["mosquitto"],
-        without: Without::Skips {
+        without: Fallback::Skips {
             tests: &["crates/palpate-live/tests/connections/broker.rs"],
             remedy: "install Debian's mosquitto, or name the program in PALPATE_MOSQUITTO",
         },
@@ -102,9 +105,9 @@ const NEEDS: [Need; 7] = [
     Need {
         name: "a C compiler",
         variable: None,
-        found: |_, _| run::answers("cc", &["--version"]),
+        found: |_, _| run::is_runnable("cc", &["--version"]),
         packages: &["gcc", "libc6-dev"],
-        without: Without::Skips {
+        without: Fallback::Skips {
             tests: &["crates/palpate-live/tests/firmware.rs"],
             remedy: "install Debian's gcc",
         },
@@ -134,10 +137,10 @@ impl Need {
 
     pub fn describe(&self) -> String {
         match self.without {
-            Without::Skips { tests, remedy } => {
+            Fallback::Skips { tests, remedy } => {
                 format!("{} is missing: skips {}; {remedy}", self.name, tests.join(", "))
             }
-            Without::FallsBack(instead) => format!("{} is missing: {instead}", self.name),
+            Fallback::FallsBack(instead) => format!("{} is missing: {instead}", self.name),
         }
     }
 
@@ -147,7 +150,7 @@ impl Need {
         }
         println!("installing {}", self.name);
         for mut command in self.installation() {
-            if !run::shown(&mut command)? {
+            if !run::run_shown(&mut command)? {
                 return Ok(false);
             }
         }
@@ -172,7 +175,7 @@ fn is_recent_node(version: &str) -> bool {
 }
 
 fn may_install() -> bool {
-    Path::new("/etc/debian_version").exists() && run::answers("apt-get", &["--version"]) && is_root()
+    Path::new("/etc/debian_version").exists() && run::is_runnable("apt-get", &["--version"]) && is_root()
 }
 
 /// Reads the effective user (`Uid:` real, effective, …).
@@ -219,7 +222,7 @@ mod tests {
     fn every_test_file_that_the_table_names_exists() {
         let root = crate::root();
         for need in &NEEDS {
-            if let Without::Skips { tests, .. } = need.without {
+            if let Fallback::Skips { tests, .. } = need.without {
                 let files = tests.iter().filter(|test| test.contains('/'));
                 files.for_each(|file| assert!(root.join(file).is_file(), "{file}"));
             }

@@ -20,14 +20,18 @@ const MOST_BYTES: u64 = 6_000_000;
 /// C library of Debian 10, Ubuntu 18.10 and later.
 const MANYLINUX: &str = "manylinux_2_28";
 
-pub type Making = JoinHandle<Result<Environment>>;
+pub type EnvironmentTask = JoinHandle<Result<Environment>>;
 
-pub fn make_environment(root: &Path) -> Option<Making> {
+pub fn make_environment(root: &Path) -> Option<EnvironmentTask> {
     begin_environment(root, "target/xtask/python", REQUIREMENTS)
 }
 
 /// Returns `None` without Python.
-pub fn begin_environment(root: &Path, folder: &'static str, requirements: &'static str) -> Option<Making> {
+pub fn begin_environment(
+    root: &Path,
+    folder: &'static str,
+    requirements: &'static str,
+) -> Option<EnvironmentTask> {
     let root = root.to_path_buf();
     PYTHON
         .is_there(&root)
@@ -38,7 +42,7 @@ pub fn begin_environment(root: &Path, folder: &'static str, requirements: &'stat
 pub fn test(
     root: &Path,
     skips: Skips,
-    environment: Option<Making>,
+    environment: Option<EnvironmentTask>,
     tested: &[&str],
 ) -> Result<(bool, Option<Counts>)> {
     let Some(environment) = environment else {
@@ -47,7 +51,7 @@ pub fn test(
     };
     let mut build = Command::new("cargo");
     build.args(["build", "--quiet"]).args(tested).current_dir(root);
-    if !run::shown(&mut build)? {
+    if !run::run_shown(&mut build)? {
         return Ok((false, None));
     }
     let built = root.join("target/debug").join(format!("{DLL_PREFIX}_palpate{DLL_SUFFIX}"));
@@ -63,7 +67,7 @@ pub fn test(
     if skips == Skips::Fail {
         tests.env(STRICT, "1");
     }
-    let watched = run::watched(&mut tests)?;
+    let watched = run::run_captured(&mut tests)?;
     Ok((watched.succeeded, Counts::of_pytest(&watched.lines)))
 }
 
@@ -81,7 +85,7 @@ pub fn wheel(root: &Path) -> Result<bool> {
         "--manifest-path",
         "python/Cargo.toml",
     ]);
-    if !run::shown(build.arg("--out").arg(&wheels).current_dir(root))? {
+    if !run::run_shown(build.arg("--out").arg(&wheels).current_dir(root))? {
         return Ok(false);
     }
     let wheel = only_wheel(&wheels)?;
@@ -92,7 +96,7 @@ pub fn wheel(root: &Path) -> Result<bool> {
     // The oldest installed Python represents the oldest of all.
     let oldest = ["python3.10", "python3.11", "python3"]
         .into_iter()
-        .find(|python| run::answers(python, &["--version"]));
+        .find(|python| run::is_runnable(python, &["--version"]));
     for (name, python, requirements) in [
         ("newest", "python3", &[REQUIREMENTS][..]),
         ("oldest", oldest.unwrap_or("python3"), &[REQUIREMENTS, OLDEST][..]),
@@ -103,11 +107,11 @@ pub fn wheel(root: &Path) -> Result<bool> {
         let environment = Environment::at(root, &folder, python, requirements)?;
         let mut install = environment.run("python");
         install.args(["-m", "pip", "install", "--quiet", "--no-deps"]).arg(&wheel);
-        if !run::shown(&mut install)? {
+        if !run::run_shown(&mut install)? {
             bail!("the wheel cannot be installed");
         }
         let mut tests = environment.pytest(root);
-        succeeded &= run::shown(tests.env("PALPATE_OPTIMISED", "1").env_remove("PYTHONPATH"))?;
+        succeeded &= run::run_shown(tests.env("PALPATE_OPTIMISED", "1").env_remove("PYTHONPATH"))?;
     }
     Ok(succeeded)
 }
@@ -137,7 +141,7 @@ impl Environment {
         for (i, file) in requirements.iter().enumerate() {
             install.args([if i == 0 { "-r" } else { "-c" }, file]);
         }
-        if !run::shown(make.args(["-m", "venv"]).arg(&own.folder))? || !run::shown(&mut install)? {
+        if !run::run_shown(make.args(["-m", "venv"]).arg(&own.folder))? || !run::run_shown(&mut install)? {
             bail!("the environment {folder} cannot be made");
         }
         fs::write(&stamp, wanted).with_context(|| format!("cannot write {}", stamp.display()))?;

@@ -7,7 +7,7 @@ use std::thread::{self, JoinHandle};
 
 use anyhow::{Context, Result};
 
-pub struct Kept {
+pub struct CapturedOutput {
     pub succeeded: bool,
     /// Output without colours, then error output.
     pub lines: Vec<String>,
@@ -19,13 +19,13 @@ pub fn joined<T>(thread: JoinHandle<T>) -> T {
 }
 
 /// Runs a command with an empty standard input.
-pub fn shown(command: &mut Command) -> Result<bool> {
+pub fn run_shown(command: &mut Command) -> Result<bool> {
     let status = command.stdin(Stdio::null()).status().with_context(|| cannot_start(command))?;
     Ok(status.success())
 }
 
 /// Runs a command, and shows and keeps its output.
-pub fn watched(command: &mut Command) -> Result<Kept> {
+pub fn run_captured(command: &mut Command) -> Result<CapturedOutput> {
     if io::stderr().is_terminal() {
         command.env("CARGO_TERM_COLOR", "always");
     }
@@ -40,16 +40,16 @@ pub fn watched(command: &mut Command) -> Result<Kept> {
     })
     .with_context(|| format!("cannot pass on the output of {command:?}"))?;
     let status = child.wait().with_context(|| format!("cannot wait for {command:?}"))?;
-    Ok(Kept { succeeded: status.success(), lines })
+    Ok(CapturedOutput { succeeded: status.success(), lines })
 }
 
-pub fn answers(program: &str, arguments: &[&str]) -> bool {
+pub fn is_runnable(program: &str, arguments: &[&str]) -> bool {
     let mut command = Command::new(program);
     command.args(arguments).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     command.status().is_ok_and(|status| status.success())
 }
 
-pub fn answer(program: &str, arguments: &[&str]) -> Option<String> {
+pub fn first_line(program: &str, arguments: &[&str]) -> Option<String> {
     let output = Command::new(program).args(arguments).stdin(Stdio::null()).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).into_owned())
 }
@@ -97,15 +97,15 @@ mod tests {
 
     #[test]
     fn both_streams_of_a_command_are_kept() {
-        let kept = watched(Command::new("sh").args(["-c", "echo out; echo err >&2; exit 3"])).unwrap();
+        let kept = run_captured(Command::new("sh").args(["-c", "echo out; echo err >&2; exit 3"])).unwrap();
         assert!(!kept.succeeded);
         assert_eq!(kept.lines, ["out", "err"]);
     }
 
     #[test]
     fn a_program_that_is_not_there_is_an_error_that_names_it() {
-        let error = shown(&mut Command::new("no-such-program-at-all")).unwrap_err();
+        let error = run_shown(&mut Command::new("no-such-program-at-all")).unwrap_err();
         assert!(error.to_string().contains("no-such-program-at-all"), "{error}");
-        assert!(!answers("no-such-program-at-all", &[]));
+        assert!(!is_runnable("no-such-program-at-all", &[]));
     }
 }

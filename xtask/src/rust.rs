@@ -18,14 +18,14 @@ pub struct UsedPath {
 }
 
 #[derive(Debug, Default)]
-pub struct Uses {
+pub struct FileReferences {
     /// Paths in expressions, types, `use` declarations and macro arguments.
     pub paths: Vec<UsedPath>,
     /// Modules in files: `mod name;`.
     pub modules: Vec<String>,
 }
 
-impl Uses {
+impl FileReferences {
     pub fn of(file: &syn::File) -> Self {
         let mut uses = Self::default();
         uses.visit_file(file);
@@ -100,7 +100,7 @@ impl Uses {
     }
 }
 
-impl<'ast> Visit<'ast> for Uses {
+impl<'ast> Visit<'ast> for FileReferences {
     fn visit_item(&mut self, item: &'ast Item) {
         let attributes = match item {
             Item::Const(item) => &item.attrs,
@@ -254,8 +254,8 @@ fn at(span: Span, error: &dyn std::error::Error) -> anyhow::Error {
 mod tests {
     use super::*;
 
-    fn uses(code: &str) -> Uses {
-        Uses::of(&parse(code).unwrap())
+    fn uses(code: &str) -> FileReferences {
+        FileReferences::of(&parse(code).unwrap())
     }
 
     fn paths(code: &str) -> Vec<String> {
@@ -295,7 +295,7 @@ mod tests {
 
     #[test]
     fn lines_imported_names_and_declared_modules_are_found() {
-        let Uses { paths, .. } =
+        let FileReferences { paths, .. } =
             uses("\n\nuse a::{self, b as c, d::{e, self}};\nfn f() { let f = a::b as u8; }");
         let found: Vec<_> = paths.iter().map(|path| (path.line, path.imported.as_deref())).collect();
         let (a, c, e, d) = (Some("a"), Some("c"), Some("e"), Some("d"));

@@ -5,13 +5,13 @@ use std::path::Path;
 use anyhow::Result;
 
 use crate::needs::PYTHON;
-use crate::python::{self, Environment, Making};
+use crate::python::{self, Environment, EnvironmentTask};
 use crate::run;
-use crate::skipped::{Skipped, Skips};
+use crate::skipped::{SkipLog, Skips};
 
 const REQUIREMENTS: &str = "docs/requirements.txt";
 
-pub fn make_environment(root: &Path) -> Option<Making> {
+pub fn make_environment(root: &Path) -> Option<EnvironmentTask> {
     python::begin_environment(root, "target/xtask/docs", REQUIREMENTS)
 }
 
@@ -25,7 +25,12 @@ pub fn build(root: &Path) -> Result<bool> {
 }
 
 /// Skips without Python or its package index.
-pub fn test(root: &Path, skips: Skips, skipped: &Skipped, environment: Option<Making>) -> Result<bool> {
+pub fn test(
+    root: &Path,
+    skips: Skips,
+    skipped: &SkipLog,
+    environment: Option<EnvironmentTask>,
+) -> Result<bool> {
     let Some(environment) = environment else {
         println!("{}", PYTHON.describe());
         return Ok(skips == Skips::Pass);
@@ -44,7 +49,7 @@ fn built(root: &Path, environment: &Environment) -> Result<bool> {
     let mut mkdocs = environment.run("mkdocs");
     // The theme advertises its successor, which ARCHITECTURE.md discusses.
     mkdocs.args(["build", "--strict", "--quiet"]).env("NO_MKDOCS_2_WARNING", "1").current_dir(root);
-    let succeeded = run::shown(&mut mkdocs)?;
+    let succeeded = run::run_shown(&mut mkdocs)?;
     if succeeded {
         println!("{}", root.join("target/site/index.html").display());
     }

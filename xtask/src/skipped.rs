@@ -20,11 +20,11 @@ pub enum Skips {
 }
 
 #[derive(Clone)]
-pub struct Skipped {
+pub struct SkipLog {
     pub file: PathBuf,
 }
 
-impl Skipped {
+impl SkipLog {
     /// Empties the file of the previous run.
     pub fn begin(root: &Path) -> Result<Self> {
         let file = root.join("target/xtask/skipped.txt");

@@ -10,11 +10,11 @@ use anyhow::Result;
 use crate::counts::Counts;
 use crate::dashboard;
 use crate::features;
-use crate::needs::{self, NEXTEST, Without};
+use crate::needs::{self, Fallback, NEXTEST};
 use crate::python;
 use crate::run;
 use crate::site;
-use crate::skipped::{self, STRICT, Skipped, Skips};
+use crate::skipped::{self, STRICT, SkipLog, Skips};
 use crate::tidy;
 
 /// The build and the Python tests share these targets, so that cargo compiles once.
@@ -31,7 +31,7 @@ struct Step {
 }
 
 pub fn run(root: &Path, skips: Skips) -> Result<bool> {
-    let skipped = Skipped::begin(root)?;
+    let skipped = SkipLog::begin(root)?;
     let mut missing = Vec::new();
     let [workspace, with, features] = features::all_but_slow(root)?;
     let everything = [workspace.as_str(), &with, &features];
@@ -44,26 +44,29 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
     let dashboard = dashboard::begin_build(root);
     let mut steps = vec![
         prerequisites,
-        step("formatting", || shown(root, &["fmt", "--all", "--check"]))?,
+        step("formatting", || run_cargo(root, &["fmt", "--all", "--check"]))?,
         step("fuzz lock", || {
-            shown(root, &["fetch", "--quiet", "--locked", "--manifest-path", "fuzz/Cargo.toml"])
+            run_cargo(root, &["fetch", "--quiet", "--locked", "--manifest-path", "fuzz/Cargo.toml"])
         })?,
         step("clippy", || {
-            shown(root, &[&["clippy", "--all-targets"], &everything[..], &["--", "-D", "warnings"]].concat())
+            run_cargo(
+                root,
+                &[&["clippy", "--all-targets"], &everything[..], &["--", "-D", "warnings"]].concat(),
+            )
         })?,
         step("build", || {
             let has_dashboard = dashboard::wait(dashboard)?;
-            let (succeeded, counts) = shown(root, &[&["build"], &tested[..]].concat())?;
+            let (succeeded, counts) = run_cargo(root, &[&["build"], &tested[..]].concat())?;
             Ok((has_dashboard && succeeded, counts))
         })?,
         step("tests", || tests(root, skips, &skipped, &product))?,
         step("xtask tests", || tests(root, skips, &skipped, &["--package", "xtask"]))?,
     ];
     steps.extend([
-        step("doc tests", || watched(cargo(root, &[&["test", "--doc"], &product[..]].concat())))?,
+        step("doc tests", || run_watched(cargo(root, &[&["test", "--doc"], &product[..]].concat())))?,
         step("docs", || {
             let mut docs = cargo(root, &[&["doc", "--no-deps"], &everything[..]].concat());
-            Ok((run::shown(docs.env("RUSTDOCFLAGS", "-D warnings"))?, None))
+            Ok((run::run_shown(docs.env("RUSTDOCFLAGS", "-D warnings"))?, None))
         })?,
         step("site", || Ok((site::test(root, skips, &skipped, site)?, None)))?,
         step("Python tests", || python::test(root, skips, environment, &tested))?,
@@ -89,7 +92,7 @@ fn prerequisites(root: &Path, skips: Skips, missing: &mut Vec<String>) -> Outcom
     for need in needs::missing(root)? {
         println!("{}", need.describe());
         missing.push(need.describe());
-        succeeded &= skips == Skips::Pass || matches!(need.without, Without::FallsBack(_));
+        succeeded &= skips == Skips::Pass || matches!(need.without, Fallback::FallsBack(_));
     }
     if missing.is_empty() {
         println!("all there");
@@ -97,7 +100,7 @@ fn prerequisites(root: &Path, skips: Skips, missing: &mut Vec<String>) -> Outcom
     Ok((succeeded, None))
 }
 
-fn tests(root: &Path, skips: Skips, skipped: &Skipped, packages: &[&str]) -> Outcome {
+fn tests(root: &Path, skips: Skips, skipped: &SkipLog, packages: &[&str]) -> Outcome {
     let mut command = if NEXTEST.is_there(root) {
         // Two more than there are cores: many tests wait for a board or a server.
         let threads =
@@ -112,7 +115,7 @@ fn tests(root: &Path, skips: Skips, skipped: &Skipped, packages: &[&str]) -> Out
         Skips::Pass => command.env_remove(STRICT),
     };
     let before = skipped.lines()?.len();
-    let (succeeded, counts) = watched(command)?;
+    let (succeeded, counts) = run_watched(command)?;
     let skips = skipped.lines()?.len() - before;
     Ok((succeeded, counts.map(|counts| counts.with_skips(skips))))
 }
@@ -123,12 +126,12 @@ fn cargo(root: &Path, arguments: &[&str]) -> Command {
     command
 }
 
-fn shown(root: &Path, arguments: &[&str]) -> Outcome {
-    Ok((run::shown(&mut cargo(root, arguments))?, None))
+fn run_cargo(root: &Path, arguments: &[&str]) -> Outcome {
+    Ok((run::run_shown(&mut cargo(root, arguments))?, None))
 }
 
-fn watched(mut command: Command) -> Outcome {
-    let watched = run::watched(&mut command)?;
+fn run_watched(mut command: Command) -> Outcome {
+    let watched = run::run_captured(&mut command)?;
     Ok((watched.succeeded, Counts::read(&watched.lines)))
 }
 

@@ -26,7 +26,7 @@ pub fn run(root: &Path) -> Result<bool> {
     ] {
         println!("\n=== cargo {}", arguments.join(" "));
         let mut cargo = Command::new("cargo");
-        succeeded &= run::shown(cargo.args(arguments).envs(flags).current_dir(root))?;
+        succeeded &= run::run_shown(cargo.args(arguments).envs(flags).current_dir(root))?;
     }
     Ok(succeeded)
 }

@@ -1,6 +1,6 @@
 //! Byte chunks of a file or stdin, read by a thread that a signal can interrupt.
 
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::progress;
 use crate::remark::remark;
 use std::fs::File;
@@ -39,7 +39,7 @@ impl Chunks {
     fn read(path: Option<PathBuf>, name: String) -> Result<Self, Failure> {
         let (sender, chunks) = sync_channel(AHEAD);
         let reader = std::thread::Builder::new().spawn(move || send_all(path, &sender));
-        reader.map_err(|error| Complaint::new(format!("cannot read {name}: {error}")))?;
+        reader.map_err(|error| UserError::new(format!("cannot read {name}: {error}")))?;
         let mut opened = Self { name, chunks };
         opened.next()?;
         Ok(opened)
@@ -72,7 +72,7 @@ impl Chunks {
             let is_utf16 = begins.starts_with(b"\xff\xfe") || begins.starts_with(b"\xfe\xff");
             if let Some(at) = chunk.iter().position(|byte| *byte == 0).filter(|_| !is_utf16) {
                 let complaint = format!("{} is not text: byte {} is 0", self.name, bytes.len() + at + 1);
-                return Err(Complaint::new(complaint).help("save it as UTF-8").into());
+                return Err(UserError::new(complaint).help("save it as UTF-8").into());
             }
             bytes.extend(chunk);
         }
@@ -102,7 +102,7 @@ fn send_all(path: Option<PathBuf>, to: &SyncSender<io::Result<Vec<u8>>>) {
 }
 
 fn unreadable(name: &str, error: &io::Error) -> Failure {
-    let complaint = Complaint::new(format!("cannot read {name}: {error}"));
+    let complaint = UserError::new(format!("cannot read {name}: {error}"));
     match error.kind() {
         io::ErrorKind::NotFound => {
             complaint.help("check the name; it is taken from the current folder").into()

@@ -1,6 +1,6 @@
 //! Text lines about contacts: their beginnings, changes and ends.
 
-use palpate_estimators::estimator::{Track, Tracked};
+use palpate_estimators::estimator::{Track, TrackedContact};
 use palpate_mechanics::units::format_count;
 
 /// Shortest time between two lines about changes of a contact.
@@ -23,7 +23,7 @@ struct Line {
     number: u64,
     begun_s: f64,
     time_s: f64,
-    contact: Tracked,
+    contact: TrackedContact,
 }
 
 impl ContactLines {
@@ -68,21 +68,21 @@ impl ContactLines {
     }
 }
 
-fn has_changed(before: &Tracked, now: &Tracked) -> bool {
+fn has_changed(before: &TrackedContact, now: &TrackedContact) -> bool {
     let is_outside = |value: f64, (low, high): (f64, f64)| value < low || value > high;
     let has_moved_across =
-        before.across.zip(now.across).is_some_and(|(before, now)| is_outside(now.y_m, before.y_95_m));
+        before.transverse.zip(now.transverse).is_some_and(|(before, now)| is_outside(now.y_m, before.y_95_m));
     is_outside(now.x_m, before.x_95_m)
         || has_moved_across
         || is_outside(now.force_n, before.force_interval_95_n())
 }
 
 /// Formats "33.0 mm (32.7 to 33.4), 2.00 N (1.96 to 2.03)".
-fn describe_contact(contact: &Tracked) -> String {
+fn describe_contact(contact: &TrackedContact) -> String {
     let mm = |(low_m, high_m): (f64, f64)| (low_m * 1e3, high_m * 1e3);
     let x = with_interval(contact.x_m * 1e3, mm(contact.x_95_m), "mm");
     let force = with_interval(contact.force_n, contact.force_interval_95_n(), "N");
-    match &contact.across {
+    match &contact.transverse {
         None => format!("{x}, {force}"),
         Some(across) => {
             let y = with_interval(across.y_m * 1e3, mm(across.y_95_m), "mm");
@@ -123,14 +123,14 @@ mod tests {
 
     fn track(time_s: f64, contact: Option<(f64, f64)>) -> Track {
         let single = Estimate::of_position(Position::along(0.1), Status::Located);
-        let contacts = contact.map(|(x_m, force_n)| Tracked {
+        let contacts = contact.map(|(x_m, force_n)| TrackedContact {
             x_m,
             speed_m_per_s: 0.0,
             force_n,
             sd: [0.0005, 0.0, 0.1],
             x_95_m: (x_m - 0.001, x_m + 0.001),
             force_95_n: None,
-            across: None,
+            transverse: None,
         });
         Track { time_s, numbers: [0.0, 1.0, 0.0], contacts: contacts.into_iter().collect(), single }
     }

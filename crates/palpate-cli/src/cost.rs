@@ -1,6 +1,6 @@
 //! Time and memory of long work, announced before its start, with a memory limit.
 
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::progress::duration;
 use crate::remark::remark;
 use palpate_estimators::estimator::{Estimator, FitCost, MemoryLimit, Size};
@@ -31,7 +31,7 @@ impl MemoryOption {
     ) -> Result<(), Failure> {
         if let Some(limit) = self.memory_limit {
             limit.check_fit(estimator, cost).map_err(|exceeded| {
-                Complaint::new(exceeded).help(limit.remedy(estimator, setup, recording))
+                UserError::new(exceeded).help(limit.remedy(estimator, setup, recording))
             })?;
         }
         if cost.memory_bytes > NOTICEABLE.memory_bytes || cost.seconds > NOTICEABLE.seconds {
@@ -55,7 +55,7 @@ impl MemoryOption {
         if let Some(limit) = self.memory_limit {
             limit
                 .check(what, bytes)
-                .map_err(|exceeded| Complaint::new(exceeded).help(format!("raise the limit, or {remedy}")))?;
+                .map_err(|exceeded| UserError::new(exceeded).help(format!("raise the limit, or {remedy}")))?;
         }
         if most_s > NOTICEABLE_WORK_S || bytes > NOTICEABLE.memory_bytes {
             let [least, most] = [least_s, most_s].map(duration);

@@ -11,27 +11,27 @@ use palpate_mechanics::surface::Extent;
 pub struct EstimateColumns {
     extent: Extent,
     contacts: usize,
-    guesses: Guesses,
+    rows: EstimateRows,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Guesses {
+pub enum EstimateRows {
     /// Rows that are neither `no_contact` nor `outside_model`, so that column averages are of
     /// contacts.
     OfContacts,
     OfAll,
 }
 
-impl Guesses {
+impl EstimateRows {
     pub fn by_option(all: bool) -> Self {
         if all { Self::OfAll } else { Self::OfContacts }
     }
 }
 
 impl EstimateColumns {
-    pub fn new(locator: &Locator, guesses: Guesses) -> Self {
+    pub fn new(locator: &Locator, guesses: EstimateRows) -> Self {
         let extent = locator.setup.surface().extent();
-        Self { extent, contacts: locator.most_contacts(), guesses }
+        Self { extent, contacts: locator.most_contacts(), rows: guesses }
     }
 
     pub fn heading(self, first: &str) -> String {
@@ -53,7 +53,7 @@ impl EstimateColumns {
 
     pub fn row(self, first: Vec<String>, estimate: &EstimateRecord) -> String {
         let without_contact = [Status::NoContact, Status::OutsideModel].map(Status::name);
-        let has_contact = self.guesses == Guesses::OfAll || !without_contact.contains(&estimate.status);
+        let has_contact = self.rows == EstimateRows::OfAll || !without_contact.contains(&estimate.status);
         let contacts = std::iter::once(&estimate.contact).chain(&estimate.further);
         let contacts: Vec<&ContactRecord> = contacts.filter(|_| has_contact).collect();
         self.row_of(first, &contacts, estimate.status)
@@ -97,8 +97,8 @@ mod tests {
     #[test]
     fn rows_without_a_contact_have_no_place_unless_asked() {
         let extent = Extent::line(0.4).unwrap();
-        let place = |status: Status, guesses: Guesses| {
-            let columns = EstimateColumns { extent, contacts: 2, guesses };
+        let place = |status: Status, guesses: EstimateRows| {
+            let columns = EstimateColumns { extent, contacts: 2, rows: guesses };
             let estimate = Estimate::of_position(Position::along(0.125), status);
             let row = columns.row(vec!["7".to_owned()], &EstimateRecord::new(&estimate, extent));
             let cells: Vec<&str> = row.trim_end().split(',').collect();
@@ -107,11 +107,11 @@ mod tests {
             cells[1].to_owned()
         };
         for status in [Status::NoContact, Status::OutsideModel] {
-            assert_eq!(place(status, Guesses::OfContacts), "");
-            assert_eq!(place(status, Guesses::OfAll), "125.0000");
+            assert_eq!(place(status, EstimateRows::OfContacts), "");
+            assert_eq!(place(status, EstimateRows::OfAll), "125.0000");
         }
         for status in [Status::Located, Status::Ambiguous, Status::OutsideSurface] {
-            assert_eq!(place(status, Guesses::OfContacts), "125.0000");
+            assert_eq!(place(status, EstimateRows::OfContacts), "125.0000");
         }
     }
 }

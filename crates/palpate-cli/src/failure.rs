@@ -18,7 +18,7 @@ pub enum Failure {
     /// Exit code 1: the command ran, but missed a stated goal.
     GoalMissed(String),
     /// Exit code 2: bad input; no file was written.
-    BadInput(Box<Complaint>),
+    BadInput(Box<UserError>),
     /// Exit code 3: the command finished, but data was lost and reported.
     DataLost(String),
     /// Exit code 128 and the signal: 130 after Ctrl-C, 143 after SIGTERM.
@@ -33,11 +33,11 @@ impl Failure {
     }
 
     pub fn from_error(error: &(dyn std::error::Error + 'static)) -> Self {
-        if Cancelled::caused(error) { Self::stopped() } else { Complaint::new(error).into() }
+        if Cancelled::caused(error) { Self::stopped() } else { UserError::new(error).into() }
     }
 
     /// Failure of long work: it was stopped, or its input is bad, with details in `complaint`.
-    pub fn of_work<E>(error: E, complaint: impl FnOnce(E) -> Complaint) -> Self
+    pub fn of_work<E>(error: E, complaint: impl FnOnce(E) -> UserError) -> Self
     where
         E: std::error::Error + 'static,
     {
@@ -61,7 +61,7 @@ impl Failure {
 }
 
 #[derive(Debug)]
-pub struct Complaint {
+pub struct UserError {
     message: String,
     help: Option<String>,
     excerpt: Option<Excerpt>,
@@ -76,12 +76,12 @@ struct Excerpt {
     span: Range<usize>,
 }
 
-impl Complaint {
+impl UserError {
     pub fn new(message: impl fmt::Display) -> Self {
         Self { message: message.to_string(), help: None, excerpt: None }
     }
 
-    pub fn about(path: &Path, problem: impl fmt::Display) -> Self {
+    pub fn for_path(path: &Path, problem: impl fmt::Display) -> Self {
         Self::new(format!("{}: {problem}", path.display()))
     }
 
@@ -115,8 +115,8 @@ impl Complaint {
     }
 }
 
-impl From<Complaint> for Failure {
-    fn from(complaint: Complaint) -> Self {
+impl From<UserError> for Failure {
+    fn from(complaint: UserError) -> Self {
         Self::BadInput(Box::new(complaint))
     }
 }
@@ -126,15 +126,15 @@ fn floor_char(text: &str, at: usize) -> usize {
     text.floor_char_boundary(at.min(text.len()))
 }
 
-impl fmt::Display for Complaint {
+impl fmt::Display for UserError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.message)
     }
 }
 
-impl std::error::Error for Complaint {}
+impl std::error::Error for UserError {}
 
-impl Diagnostic for Complaint {
+impl Diagnostic for UserError {
     fn help(&self) -> Option<Box<dyn fmt::Display + '_>> {
         self.help.as_ref().map(|help| Box::new(help) as Box<dyn fmt::Display>)
     }

@@ -1,7 +1,7 @@
 //! Input files and quantities of a command, with complaints that show the place.
 
 use crate::chunks::Chunks;
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::remark::remark;
 use palpate_estimators::estimator::{Locator, LocatorFileError};
 use palpate_estimators::recording::{self, Columns, CsvError, Recording};
@@ -16,7 +16,7 @@ pub fn read_text(path: &Path) -> Result<String, Failure> {
     let bytes = read_bytes(path)?;
     String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
-        Complaint::new(format!("{} is not UTF-8 text: byte {} is invalid", path.display(), at + 1)).into()
+        UserError::new(format!("{} is not UTF-8 text: byte {} is invalid", path.display(), at + 1)).into()
     })
 }
 
@@ -115,7 +115,7 @@ fn with_warnings(
     name: &str,
 ) -> Result<Recording, Failure> {
     let recording = recording.map_err(|error| csv_complaint(&error))?;
-    say_dialects(&recording);
+    print_dialects(&recording);
     recording.warning_lines().iter().for_each(|warning| remark!("warning: {name}: {warning}"));
     let mismatches = check_recording(setup, &recording);
     mismatches.iter().for_each(|mismatch| remark!("warning: {name}: {mismatch}"));
@@ -123,7 +123,7 @@ fn with_warnings(
 }
 
 /// Reports a table format that differs from the standard one.
-pub fn say_dialects(recording: &Recording) {
+pub fn print_dialects(recording: &Recording) {
     recording.provenance.dialects.iter().for_each(|dialect| remark!("{}: {dialect}", dialect.source));
 }
 
@@ -164,7 +164,7 @@ fn greater_than_0<T>(
 }
 
 fn rig_complaint(error: RigError, path: &Path, text: &str) -> Failure {
-    let complaint = Complaint::new(&error);
+    let complaint = UserError::new(&error);
     let complaint = match error.help() {
         Some(help) => complaint.help(help),
         None => complaint,
@@ -173,24 +173,24 @@ fn rig_complaint(error: RigError, path: &Path, text: &str) -> Failure {
     complaint.at_span(&path.display().to_string(), text, error.span.unwrap_or(0..0)).into()
 }
 
-fn locator_complaint(error: &LocatorFileError, path: &Path, text: &str) -> Complaint {
-    let complaint = Complaint::about(path, error);
+fn locator_complaint(error: &LocatorFileError, path: &Path, text: &str) -> UserError {
+    let complaint = UserError::for_path(path, error);
     let Some((line, column)) = error.place() else { return complaint };
     let line_text = text.lines().nth(line - 1).unwrap_or_default();
     let start = (column - 1).min(line_text.len());
     complaint.at_line(&path.display().to_string(), line, line_text, start..line_text.len().min(start + 1))
 }
 
-pub fn csv_complaint(error: &CsvError) -> Complaint {
+pub fn csv_complaint(error: &CsvError) -> UserError {
     match &error.place {
         // The heading above the excerpt states the place.
-        Some(place) => Complaint::new(&error.problem).at_line(
+        Some(place) => UserError::new(&error.problem).at_line(
             &error.source_name,
             place.line,
             &place.text,
             place.span.clone(),
         ),
-        None => Complaint::new(error),
+        None => UserError::new(error),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Lines and readings of a file or stdin, as they arrive.
 
 use crate::chunks::Chunks;
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::input;
 use crate::json::object;
 use crate::output;
@@ -25,7 +25,7 @@ pub struct Lines {
     /// True after a line that ends with CR: a following LF belongs to it.
     after_cr: bool,
     parsed: u64,
-    lost: u64,
+    skipped: u64,
     records: Records,
 }
 
@@ -56,7 +56,7 @@ impl Lines {
             line: Vec::new(),
             after_cr: false,
             parsed: 0,
-            lost: 0,
+            skipped: 0,
             records,
         })
     }
@@ -75,7 +75,7 @@ impl Lines {
         loop {
             let (chunk, taken) = &mut self.chunk;
             if *taken == chunk.len() {
-                let next = self.source.next().map_err(|failure| stopped_after(failure, self.count))?;
+                let next = self.source.next().map_err(|failure| with_last_line(failure, self.count))?;
                 let Some(next) = next else { break };
                 self.chunk = (self.decoder.decode(&next), 0);
                 continue;
@@ -105,8 +105,8 @@ impl Lines {
         Ok(Some(if length <= MOST_BYTES { Ok(&self.line) } else { Err(TooLong) }))
     }
 
-    pub fn lose(&mut self, error: &(dyn Error + 'static)) -> Result<(), Failure> {
-        self.lost += 1;
+    pub fn skip_reading(&mut self, error: &(dyn Error + 'static)) -> Result<(), Failure> {
+        self.skipped += 1;
         // An error of a parser contains source and line.
         let (column, reason, words) = match error.downcast_ref::<CsvError>() {
             Some(CsvError { place, problem, .. }) => {
@@ -114,24 +114,24 @@ impl Lines {
             }
             None => (None, error.to_string(), format!("{}:{}: {error}", self.name(), self.count)),
         };
-        if self.lost <= MOST_SKIPS {
+        if self.skipped <= MOST_SKIPS {
             alert!("palpate: skipped: {words}");
-        } else if self.lost == MOST_SKIPS + 1 {
+        } else if self.skipped == MOST_SKIPS + 1 {
             alert!("palpate: skipped: further lines, which are counted at the end");
         }
         if self.records == Records::None {
             return Ok(());
         }
-        output::say_json_line(&object! { "line": self.count, "column"?: column, "skipped": reason })
+        output::print_json_line(&object! { "line": self.count, "column"?: column, "skipped": reason })
     }
 
     pub fn is_whole(&self) -> bool {
-        self.lost == 0
+        self.skipped == 0
     }
 
     /// Fails if some lines gave no `answer`, or if no line contains a reading.
     pub fn finish(&self, answer: &str) -> Result<(), Failure> {
-        match self.lost {
+        match self.skipped {
             0 if self.parsed == 0 => {
                 Err(Failure::DataLost(format!("{} contains a header and no reading", self.name())))
             }
@@ -141,7 +141,7 @@ impl Lines {
     }
 }
 
-fn stopped_after(failure: Failure, line: u64) -> Failure {
+fn with_last_line(failure: Failure, line: u64) -> Failure {
     match failure {
         Failure::Interrupted(_) => Failure::Interrupted(format!("stopped after line {line}")),
         other => other,
@@ -152,7 +152,7 @@ fn stopped_after(failure: Failure, line: u64) -> Failure {
 struct DialectNote(String);
 
 impl DialectNote {
-    fn say(&mut self, dialect: &Dialect) {
+    fn report_dialect(&mut self, dialect: &Dialect) {
         let words = dialect.to_string();
         if words != self.0 {
             remark!("{}: {words}", dialect.source);
@@ -184,7 +184,7 @@ impl<P: LineParser> Parsing<P> {
             Ok(Ok(parsed)) => {
                 if parsed.is_some() {
                     lines.parsed += 1;
-                    self.note.say(self.parser.progress().dialect());
+                    self.note.report_dialect(self.parser.progress().dialect());
                 }
                 return Ok(Some(parsed));
             }
@@ -194,15 +194,15 @@ impl<P: LineParser> Parsing<P> {
                 if self.parser.progress().awaits_columns() && !may_be_torn {
                     return Err(input::csv_complaint(&error).into());
                 }
-                lines.lose(&error)?;
+                lines.skip_reading(&error)?;
             }
             Err(error) => {
                 if self.parser.progress().awaits_columns() && self.header != Header::Absent {
                     let place = format!("{}:{}", lines.name(), lines.count);
-                    return Err(Complaint::new(format!("{place}: {error}")).into());
+                    return Err(UserError::new(format!("{place}: {error}")).into());
                 }
                 self.parser.progress().skip_line();
-                lines.lose(&error)?;
+                lines.skip_reading(&error)?;
             }
         }
         Ok(Some(None))

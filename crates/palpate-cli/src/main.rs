@@ -157,7 +157,7 @@ fn answer(error: &clap::Error) -> ExitCode {
     match (error.use_stderr(), printed) {
         (true, _) => ExitCode::from(2),
         (false, Ok(())) => ExitCode::SUCCESS,
-        (false, Err(error)) => output::unprinted(&error).report(),
+        (false, Err(error)) => output::print_failure(&error).report(),
     }
 }
 

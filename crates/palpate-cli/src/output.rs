@@ -1,6 +1,6 @@
 //! Output of a command on stdout: lines, JSON and tables.
 
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::stdout;
 use comfy_table::{CellAlignment, presets};
 use palpate_mechanics::units::format_count;
@@ -8,27 +8,27 @@ use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
-pub fn say_report(before: &str, folder: Option<&Path>) -> Result<(), Failure> {
+pub fn print_report_path(before: &str, folder: Option<&Path>) -> Result<(), Failure> {
     match folder {
-        Some(folder) => say(format!("{before}Report: {}", folder.join("report.html").display())),
+        Some(folder) => print_line(format!("{before}Report: {}", folder.join("report.html").display())),
         None => Ok(()),
     }
 }
 
-pub fn say(line: impl Display) -> Result<(), Failure> {
+pub fn print_line(line: impl Display) -> Result<(), Failure> {
     print(&mut std::io::stdout().lock(), format!("{line}\n").as_bytes())
 }
 
-pub fn say_json(value: &impl serde::Serialize) -> Result<(), Failure> {
-    say(to_json(value)?)
+pub fn print_json(value: &impl serde::Serialize) -> Result<(), Failure> {
+    print_line(to_json(value)?)
 }
 
-pub fn say_json_line(value: &impl serde::Serialize) -> Result<(), Failure> {
-    say(serde_json::to_string(value).map_err(Complaint::new)?)
+pub fn print_json_line(value: &impl serde::Serialize) -> Result<(), Failure> {
+    print_line(serde_json::to_string(value).map_err(UserError::new)?)
 }
 
 pub fn to_json(value: &impl serde::Serialize) -> Result<String, Failure> {
-    serde_json::to_string_pretty(value).map_err(|error| Complaint::new(error).into())
+    serde_json::to_string_pretty(value).map_err(|error| UserError::new(error).into())
 }
 
 /// Writes to stdout or its replacement; a closed reader is not an error.
@@ -36,24 +36,24 @@ pub fn print(out: &mut impl Write, bytes: &[u8]) -> Result<(), Failure> {
     if stdout::was_closed() {
         return Err(closed());
     }
-    out.write_all(bytes).map_err(|error| unprinted(&error))
+    out.write_all(bytes).map_err(|error| print_failure(&error))
 }
 
 /// Flushes the output: the reader of a pipe gets each result at once.
 pub fn flush(out: &mut impl Write) -> Result<(), Failure> {
-    out.flush().map_err(|error| unprinted(&error))
+    out.flush().map_err(|error| print_failure(&error))
 }
 
 /// Failure of a write to stdout; a closed reader is not an error.
-pub fn unprinted(error: &std::io::Error) -> Failure {
+pub fn print_failure(error: &std::io::Error) -> Failure {
     match error.kind() {
         ErrorKind::BrokenPipe => Failure::NobodyReads,
-        _ => Complaint::new(format!("cannot write to stdout: {error}")).into(),
+        _ => UserError::new(format!("cannot write to stdout: {error}")).into(),
     }
 }
 
 pub fn closed() -> Failure {
-    Complaint::new("cannot write to stdout: it is closed").into()
+    UserError::new("cannot write to stdout: it is closed").into()
 }
 
 /// A text table; the columns after the first are aligned to the right.

@@ -1,6 +1,6 @@
 //! Rule files.
 
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::input;
 use palpate_estimators::estimator::Locator;
 use palpate_live::rules::Rules;
@@ -13,13 +13,13 @@ pub fn read(path: Option<&Path>, extent: Extent) -> Result<Rules, Failure> {
     let text = input::read_text(path)?;
     Ok(Rules::from_toml(&text, extent).map_err(|error| {
         let span = error.span.clone().unwrap_or(0..0);
-        Complaint::new(error).at_span(&path.display().to_string(), &text, span)
+        UserError::new(error).at_span(&path.display().to_string(), &text, span)
     })?)
 }
 
 /// Rejects rules about a force that the locator does not estimate.
-pub fn refuse_untold_forces(rules: &Rules, path: &Path, locator: &Locator) -> Result<(), Failure> {
-    if locator.tells_force() {
+pub fn check_force_rules(rules: &Rules, path: &Path, locator: &Locator) -> Result<(), Failure> {
+    if locator.estimates_force() {
         return Ok(());
     }
     let Some(rule) = rules.first_of_force() else { return Ok(()) };
@@ -28,13 +28,15 @@ pub fn refuse_untold_forces(rules: &Rules, path: &Path, locator: &Locator) -> Re
         rule.name,
         locator.kind()
     );
-    let complaint = Complaint::about(path, problem);
+    let complaint = UserError::for_path(path, problem);
     Err(complaint.help("remove `force`, or fit an estimator of the force, such as `influence`").into())
 }
 
 pub fn refuse_publishing(publishing: &Rules, path: &Path, help: &str) -> Result<(), Failure> {
     let Some(rule) = publishing.as_slice().first() else { return Ok(()) };
-    let complaint =
-        Complaint::about(path, format!("rule `{}` publishes a message, but no broker is given", rule.name));
+    let complaint = UserError::for_path(
+        path,
+        format!("rule `{}` publishes a message, but no broker is given", rule.name),
+    );
     Err(complaint.help(help).into())
 }

@@ -1,6 +1,6 @@
 //! Options of all verbs with a live session.
 
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::input;
 use palpate_estimators::estimator::Locator;
 use palpate_live::pipeline;
@@ -44,7 +44,7 @@ impl SessionOptions {
 
     pub fn session<'a>(&self, locator: &'a Locator, path: &Path) -> Result<Session<'a>, Failure> {
         Session::new(locator, &self.config()).map_err(|error| {
-            Complaint::about(path, error)
+            UserError::for_path(path, error)
                 .help("omit --track, --frequency or --creep, or fit another estimator")
                 .into()
         })
@@ -52,6 +52,6 @@ impl SessionOptions {
 
     pub fn check_source(&self, from: &SourceUrl) -> Result<(), Failure> {
         pipeline::check_pace(&self.config().estimation, from)
-            .map_err(|error| Complaint::new(format!("--from {from}: {error}")).into())
+            .map_err(|error| UserError::new(format!("--from {from}: {error}")).into())
     }
 }

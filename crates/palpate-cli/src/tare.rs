@@ -1,11 +1,11 @@
 //! `--tare`: correction of readings for offsets that have changed since the calibration.
 
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::input::{self, RecordingFiles};
 use crate::lines::{Lines, Readings, Records};
 use crate::progress::Observer;
 use crate::remark::remark;
-use palpate_estimators::estimator::{Estimate, Locator, Status, Tare, TareError, take_off_drift};
+use palpate_estimators::estimator::{Estimate, Locator, Status, Tare, TareError, subtract_drift};
 use palpate_estimators::evaluation::Split;
 use palpate_estimators::fit::FitTask;
 use palpate_estimators::influence::Influence;
@@ -49,7 +49,7 @@ impl TareOption {
 
     pub fn check_recorded(&self, files: &RecordingFiles) -> Result<(), Failure> {
         if self.tare.is_some() && files.data.is_none() {
-            let complaint = Complaint::new("--tare needs a recording: simulated calibrations start at zero");
+            let complaint = UserError::new("--tare needs a recording: simulated calibrations start at zero");
             return Err(complaint.help("--data names a recording to evaluate on").into());
         }
         Ok(())
@@ -57,7 +57,7 @@ impl TareOption {
 
     pub fn check_drifts(&self, files: &RecordingFiles, setup: &Setup) -> Result<(), Failure> {
         if self.tare.is_some() && files.data.is_none() && setup.imperfections().is_none() {
-            let complaint = Complaint::new("--tare: simulated readings do not drift");
+            let complaint = UserError::new("--tare: simulated readings do not drift");
             return Err(complaint.help("--data names a recording to evaluate on").into());
         }
         Ok(())
@@ -124,7 +124,7 @@ impl Source {
         }
     }
 
-    fn followed(&self) -> Option<&'static str> {
+    fn updated_label(&self) -> Option<&'static str> {
         match self {
             Self::Auto { .. } => Some("auto"),
             Self::Last { .. } => Some("last"),
@@ -161,7 +161,7 @@ impl FromStr for Source {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub enum Taken {
+pub enum TareOutcome {
     Baseline,
     Tared,
     /// A tared reading, with its estimate by the tare that updates the baseline.
@@ -191,7 +191,7 @@ pub struct Taring<'a> {
     /// Number of readings that are `outside_model` with an updated baseline.
     unexplained: u64,
     /// First readings of the baseline, to check that they are untouched.
-    kept: Vec<Vec<f64>>,
+    first_readings: Vec<Vec<f64>>,
     tared: Vec<f64>,
 }
 
@@ -204,11 +204,11 @@ impl<'a> Taring<'a> {
     pub fn new(option: &TareOption, locator: &'a Locator, no_header: bool) -> Result<Option<Self>, Failure> {
         let Some(source) = option.tare.clone() else { return Ok(None) };
         let tare = locator.tare().map_err(|error| {
-            Complaint::new(format!("--tare: {error}")).help(
+            UserError::new(format!("--tare: {error}")).help(
                 "add rows of force 0 to the recording and fit again, or fit `kind = \"influence\"` to a recording with forces",
             )
         })?;
-        let tared = tare.learnt().to_vec();
+        let tared = tare.calibration_baseline().to_vec();
         let mut taring = Self {
             locator,
             source: source.clone(),
@@ -218,7 +218,7 @@ impl<'a> Taring<'a> {
             first: 0,
             count: 0,
             unexplained: 0,
-            kept: Vec::new(),
+            first_readings: Vec::new(),
             tared,
         };
         match source {
@@ -227,10 +227,10 @@ impl<'a> Taring<'a> {
             Source::Auto { .. } | Source::Last { .. } if locator.false_alarm_rate().is_none() => {
                 let complaint = format!(
                     "--tare {}: a locator of kind `{}` cannot distinguish untouched readings from contacts",
-                    source.followed().unwrap_or_default(),
+                    source.updated_label().unwrap_or_default(),
                     locator.kind()
                 );
-                return Err(Complaint::new(complaint)
+                return Err(UserError::new(complaint)
                     .help("--tare N uses the first N readings as untouched, --tare FILE those of a file")
                     .into());
             }
@@ -243,21 +243,22 @@ impl<'a> Taring<'a> {
     fn read(&mut self, path: &Path, no_header: bool) -> Result<(), Failure> {
         let mut readings = Readings::new(Lines::open(path, Records::None)?, &self.locator.setup, no_header);
         while let Some(reading) = readings.next()? {
-            self.add(&reading).map_err(|error| Complaint::about(path, error))?;
+            self.add(&reading).map_err(|error| UserError::for_path(path, error))?;
         }
         if !readings.lines.is_whole() {
-            let complaint = Complaint::about(path, "not every line is a reading, so the tare would be wrong");
+            let complaint =
+                UserError::for_path(path, "not every line is a reading, so the tare would be wrong");
             return Err(complaint.help("correct the lines above, or remove them").into());
         }
         if self.count == 0 {
-            let complaint = Complaint::about(path, "it contains no untouched reading");
+            let complaint = UserError::for_path(path, "it contains no untouched reading");
             return Err(complaint.help("it must begin with a header; --no-header reads values alone").into());
         }
-        self.look_again();
+        self.report_baseline();
         Ok(())
     }
 
-    pub fn take(&mut self, reading: &mut [f64], time_s: Option<f64>) -> Result<Taken, TakeError> {
+    pub fn take(&mut self, reading: &mut [f64], time_s: Option<f64>) -> Result<TareOutcome, TakeError> {
         if let Some(time_s) = time_s {
             self.tare.note_time(time_s);
         }
@@ -267,7 +268,7 @@ impl<'a> Taring<'a> {
             if self.source.first() == Start::Readings(self.count) {
                 self.end_beginning();
             }
-            return Ok(Taken::Baseline);
+            return Ok(TareOutcome::Baseline);
         }
         if self.is_beginning {
             self.end_beginning();
@@ -275,13 +276,13 @@ impl<'a> Taring<'a> {
         let taken = match self.source {
             Source::First(_) | Source::File(_) => {
                 self.tare.apply(reading, &mut self.tared)?;
-                Taken::Tared
+                TareOutcome::Tared
             }
             Source::Auto { .. } | Source::Last { .. } => {
                 let estimate = self.locator.locate_following(&mut self.tare, reading, &mut self.tared)?;
                 self.count += u64::from(estimate.status == Status::NoContact);
                 self.unexplained += u64::from(estimate.status == Status::OutsideModel);
-                Taken::Located(Box::new(estimate))
+                TareOutcome::Located(Box::new(estimate))
             }
         };
         reading.copy_from_slice(&self.tared);
@@ -301,25 +302,25 @@ impl<'a> Taring<'a> {
 
     fn end_beginning(&mut self) {
         self.is_beginning = false;
-        self.look_again();
+        self.report_baseline();
     }
 
     fn add(&mut self, reading: &[f64]) -> Result<(), TareError> {
         self.tare.add_untouched(reading)?;
         self.count += 1;
-        if self.kept.len() < MOST_KEPT {
-            self.kept.push(reading.to_vec());
+        if self.first_readings.len() < MOST_KEPT {
+            self.first_readings.push(reading.to_vec());
         }
         Ok(())
     }
 
     /// Reports the baseline, and warns if its readings vary like touched ones.
-    fn look_again(&mut self) {
-        self.say();
+    fn report_baseline(&mut self) {
+        self.print_baseline_change();
         if self.locator.false_alarm_rate().is_none() {
             return;
         }
-        let kept = std::mem::take(&mut self.kept);
+        let kept = std::mem::take(&mut self.first_readings);
         let mut touched = 0;
         for reading in &kept {
             let tared = self.tare.apply(reading, &mut self.tared);
@@ -334,8 +335,13 @@ impl<'a> Taring<'a> {
         }
     }
 
-    fn say(&self) {
-        let moved = self.tare.baseline().iter().zip(self.tare.learnt()).map(|(today, learnt)| today - learnt);
+    fn print_baseline_change(&self) {
+        let moved = self
+            .tare
+            .baseline()
+            .iter()
+            .zip(self.tare.calibration_baseline())
+            .map(|(today, learnt)| today - learnt);
         let most = moved.enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         let Some((channel, value)) = most else { return };
         let sensor = &self.locator.setup.layout().sensors()[channel];
@@ -351,9 +357,9 @@ impl<'a> Taring<'a> {
     }
 
     /// Reports an updated baseline, and warns of too few untouched readings.
-    fn say_followed(&self, followed: &str, source: &str) {
+    fn print_updated_baseline(&self, followed: &str, source: &str) {
         if self.count > 0 {
-            self.say();
+            self.print_baseline_change();
         }
         let settled = u64::from(Tare::<Vec<f64>>::SETTLED);
         if self.count < settled {
@@ -382,10 +388,10 @@ impl<'a> Taring<'a> {
                 "--tare {needed}: {source} contains {} readings; the first {needed} must be untouched",
                 self.count
             );
-            return Err(Complaint::new(complaint).help("give fewer, or record longer").into());
+            return Err(UserError::new(complaint).help("give fewer, or record longer").into());
         }
-        if let Some(followed) = self.source.followed() {
-            self.say_followed(followed, source);
+        if let Some(followed) = self.source.updated_label() {
+            self.print_updated_baseline(followed, source);
         }
         Ok(())
     }
@@ -403,7 +409,7 @@ pub fn tare_splits(
         Some(Source::Auto { first: Start::NONE }) => {}
         Some(_) => {
             let complaint = "--tare accepts only `auto` here; N, a time, a FILE and `last` need a locator: a rig is evaluated by folds of one recording";
-            return Err(Complaint::new(complaint)
+            return Err(UserError::new(complaint)
                 .help("--tare auto subtracts the drift that the presses show")
                 .into());
         }
@@ -418,30 +424,30 @@ pub fn tare_splits(
                 remark!(
                     "warning: {}: {}, and so do the held-out readings; `--tare auto` subtracts it",
                     recording.provenance.source,
-                    moved_most(setup, &course.spans())
+                    largest_drift_text(setup, &course.spans())
                 );
             }
             return Ok(());
         }
     }
     let spans = Observer::of_rounds(0)
-        .watch(|watch| take_off_drift(setup, splits, watch))
+        .watch(|watch| subtract_drift(setup, splits, watch))
         .map_err(|error| Failure::from_error(&error))?;
     match spans {
-        Some(spans) => say_drift(setup, &spans),
+        Some(spans) => print_drift(setup, &spans),
         None => remark!("palpate: the presses show no drift; readings are evaluated unchanged"),
     }
     Ok(())
 }
 
-pub fn say_drift(setup: &Setup, spans: &[f64]) {
-    remark!("palpate: {}; it is subtracted from held-out readings", moved_most(setup, spans));
+pub fn print_drift(setup: &Setup, spans: &[f64]) {
+    remark!("palpate: {}; it is subtracted from held-out readings", largest_drift_text(setup, spans));
 }
 
 /// Largest number of rows for which a warning is computed.
 const MOST_LOOKED_AT: usize = 300;
 
-fn moved_most(setup: &Setup, spans: &[f64]) -> String {
+fn largest_drift_text(setup: &Setup, spans: &[f64]) -> String {
     let most = spans.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
     let Some((channel, value)) = most else { return "no channel drifts".to_owned() };
     let sensor = &setup.layout().sensors()[channel];
@@ -458,7 +464,7 @@ pub fn tared_recording(
     let Some(mut taring) = Taring::new(option, locator, false)? else { return Ok(recording) };
     let mut kept = Vec::with_capacity(recording.rows.len());
     for (i, row) in recording.rows.iter_mut().enumerate() {
-        if taring.take(&mut row.reading, row.time_s).map_err(Complaint::new)? != Taken::Baseline {
+        if taring.take(&mut row.reading, row.time_s).map_err(UserError::new)? != TareOutcome::Baseline {
             kept.push(i);
         }
     }

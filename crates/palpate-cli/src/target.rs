@@ -1,7 +1,7 @@
 //! Files and folders that a command may write. Data is not overwritten by mistake, and files appear
 //! complete.
 
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use palpate_files::{self as whole_file, folder_of};
 use palpate_report::ReportFile;
 use std::fs::{self, Metadata};
@@ -88,7 +88,7 @@ impl Target {
                 "cannot write {}: it is a result of the study with {name} in the same folder",
                 path.display()
             );
-            return Err(Complaint::new(complaint).help("name another file").into());
+            return Err(UserError::new(complaint).help("name another file").into());
         }
         check_takes_files(folder_of(&place)).map_err(|error| cannot("write", path, &error))?;
         Ok(target)
@@ -106,7 +106,7 @@ impl Target {
     }
 
     fn place(&self) -> Result<PathBuf, Failure> {
-        let refused = |why: &str| Complaint::new(format!("cannot write {}: {why}", self.path.display()));
+        let refused = |why: &str| UserError::new(format!("cannot write {}: {why}", self.path.display()));
         if self.path == Path::new("-") {
             let complaint = refused("stdout is reserved for the output of the command");
             return Err(complaint.help("name a file; a file named `-` is `./-`").into());
@@ -184,7 +184,7 @@ impl TargetFolder {
                 let complaint =
                     format!("cannot write a report into {}: a study's {name} is there", path.display());
                 let help = format!("name another folder, or remove {}", found.display());
-                Err(Complaint::new(complaint).help(help).into())
+                Err(UserError::new(complaint).help(help).into())
             }
         }
     }
@@ -233,7 +233,7 @@ impl TargetFolder {
     /// Writes the files of a report; with the feature `png`, also a PNG of every figure.
     pub fn write_report(&self, files: Vec<ReportFile>) -> Result<(), Failure> {
         #[cfg(feature = "png")]
-        let files = palpate_report::with_png_copies(files).map_err(Complaint::new)?;
+        let files = palpate_report::with_png_copies(files).map_err(UserError::new)?;
         files.into_iter().try_for_each(|file| self.write(&file.name, &file.bytes))
     }
 
@@ -254,5 +254,5 @@ fn check_takes_files(folder: &Path) -> std::io::Result<()> {
 }
 
 pub fn cannot(what: &str, path: &Path, error: &Error) -> Failure {
-    Complaint::new(format!("cannot {what} {}: {error}", path.display())).into()
+    UserError::new(format!("cannot {what} {}: {error}", path.display())).into()
 }

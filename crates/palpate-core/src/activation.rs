@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_number_does_not_become_one() {
+    fn nan_stays_nan() {
         let mut values = [f64::NAN; 7];
         Activation::Logistic.apply_all(&mut values);
         assert!(values.iter().all(|a| a.is_nan()), "{values:?}");

@@ -7,7 +7,7 @@ use crate::{Estimate, LARGEST_READING, Status};
 use rest::{Course, RestLength, RestWatch};
 
 /// Baseline of the channels: mean of known untouched readings ([`Tare::add_untouched`]), or tracked
-/// ([`Tare::follow`]).
+/// ([`Tare::locate_and_update`]).
 ///
 /// ```
 /// use palpate_core::Tare;
@@ -22,7 +22,7 @@ use rest::{Course, RestLength, RestWatch};
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tare<B> {
-    learnt: B,
+    calibration: B,
     time_constant: u32,
     clock: Option<Clock>,
     zero: Zero,
@@ -31,7 +31,7 @@ pub struct Tare<B> {
     current: Baseline<B>,
     is_confirmed: bool,
     /// Alternative to an unconfirmed baseline, or the replaced one.
-    other: Option<Baseline<B>>,
+    alternative: Option<Baseline<B>>,
     /// Run of readings that are `outside_model` by both baselines.
     strange: u32,
     /// Run of readings with a contact as negative.
@@ -60,7 +60,7 @@ struct Clock {
 #[derive(Clone, Debug, PartialEq)]
 struct CalibrationDrift<B> {
     last: B,
-    reach: B,
+    largest_changes: B,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -167,18 +167,18 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         Self { takes_rests: false, ..self }
     }
 
-    /// Sets the drift of the calibration: first readings within `reach` of the `last` untouched one are
+    /// Sets the drift of the calibration: first readings within `largest_changes` of the `last` untouched one are
     /// untouched.
     ///
     /// # Errors
     /// A wrong number of channels, or a value of `last` that is not finite.
-    pub fn with_drift(mut self, last: B, reach: B) -> Result<Self, TareError> {
-        let needed = self.learnt.as_ref().len();
+    pub fn with_drift(mut self, last: B, largest_changes: B) -> Result<Self, TareError> {
+        let needed = self.calibration.as_ref().len();
         check(last.as_ref(), needed)?;
-        if reach.as_ref().len() != needed {
-            return Err(TareError::Channels { needed, found: reach.as_ref().len() });
+        if largest_changes.as_ref().len() != needed {
+            return Err(TareError::Channels { needed, found: largest_changes.as_ref().len() });
         }
-        self.drift = Some(CalibrationDrift { last, reach });
+        self.drift = Some(CalibrationDrift { last, largest_changes });
         Ok(self)
     }
 
@@ -188,13 +188,13 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             rest: RestWatch::new(&learnt),
             takes_rests: true,
             drift: None,
-            learnt,
+            calibration: learnt,
             time_constant: Self::TIME_CONSTANT,
             clock: None,
             zero: Zero::Followed,
             moment: None,
             is_confirmed: false,
-            other: None,
+            alternative: None,
             strange: 0,
             let_go: 0,
             as_learnt: 0,
@@ -206,7 +206,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     pub fn restarted(&self) -> Self {
         let Self { time_constant, clock, zero, takes_rests, .. } = *self;
         let drift = self.drift.clone();
-        Self { time_constant, clock, zero, takes_rests, drift, ..Self::of_learnt(self.learnt.clone()) }
+        Self { time_constant, clock, zero, takes_rests, drift, ..Self::of_learnt(self.calibration.clone()) }
     }
 
     /// Estimated current untouched reading.
@@ -215,8 +215,8 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     }
 
     /// Untouched reading at calibration.
-    pub fn learnt(&self) -> &[f64] {
-        self.learnt.as_ref()
+    pub fn calibration_baseline(&self) -> &[f64] {
+        self.calibration.as_ref()
     }
 
     /// False while the baseline may be that of a touch.
@@ -229,9 +229,9 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     /// # Errors
     /// A wrong number of channels, or a value that is not finite.
     pub fn add_untouched(&mut self, reading: &[f64]) -> Result<(), TareError> {
-        check(reading, self.learnt.as_ref().len())?;
+        check(reading, self.calibration.as_ref().len())?;
         self.is_confirmed = true;
-        self.other = None;
+        self.alternative = None;
         self.current.average(reading, u32::MAX);
         Ok(())
     }
@@ -241,12 +241,12 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     /// # Errors
     /// A wrong number of channels, or a value that is not finite.
     pub fn apply(&self, reading: &[f64], tared: &mut [f64]) -> Result<(), TareError> {
-        let needed = self.learnt.as_ref().len();
+        let needed = self.calibration.as_ref().len();
         check(reading, needed)?;
         if tared.len() != needed {
             return Err(TareError::Channels { needed, found: tared.len() });
         }
-        self.current.take_off(reading, self.learnt(), tared);
+        self.current.subtract_baseline(reading, self.calibration_baseline(), tared);
         // The difference of finite readings can overflow.
         check(tared, needed)
     }
@@ -273,14 +273,14 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     ///
     /// # Errors
     /// As for [`Tare::apply`].
-    pub fn follow(
+    pub fn locate_and_update(
         &mut self,
         reading: &[f64],
         tared: &mut [f64],
         mut locate: impl FnMut(&[f64]) -> Estimate,
     ) -> Result<Estimate, TareError> {
-        check(reading, self.learnt.as_ref().len())?;
-        self.current.carry_drift_on();
+        check(reading, self.calibration.as_ref().len())?;
+        self.current.extrapolate_drift();
         self.apply(reading, tared)?;
         let estimate = locate(tared);
         let status = estimate.status;
@@ -309,14 +309,14 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
                 return Ok(estimate);
             }
             if self.current.weight >= Self::SETTLED {
-                self.doubt(reading, tared, &mut locate);
+                self.test_alternatives(reading, tared, &mut locate);
             } else {
                 self.begin_at(reading);
             }
             return Ok(estimate);
         }
         (self.let_go, self.as_learnt, self.strange) = (0, 0, 0);
-        if let Some(other) = &mut self.other {
+        if let Some(other) = &mut self.alternative {
             other.untouched = 0;
         }
         if status == Status::NoContact && self.current.weight == 0 {
@@ -333,9 +333,9 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             self.moment = None;
         }
         self.current.count(status);
-        if !self.is_confirmed && self.current.saw_a_whole_touch() {
+        if !self.is_confirmed && self.current.has_complete_touch() {
             self.is_confirmed = true;
-            self.other = None;
+            self.alternative = None;
         }
         Ok(estimate)
     }
@@ -358,7 +358,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             self.current.put_to(reading, 1);
             return;
         };
-        let learnt = &self.learnt;
+        let learnt = &self.calibration;
         let (mean, since_s) =
             self.moment.get_or_insert_with(|| (Baseline::new(learnt.clone(), 0), clock.last_s));
         mean.average(reading, u32::MAX);
@@ -369,20 +369,27 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
     }
 
     /// Tests other baselines than the settled one.
-    fn doubt(&mut self, reading: &[f64], tared: &[f64], locate: &mut impl FnMut(&[f64]) -> Estimate) {
-        let mut scratch = self.learnt.clone();
+    fn test_alternatives(
+        &mut self,
+        reading: &[f64],
+        tared: &[f64],
+        locate: &mut impl FnMut(&[f64]) -> Estimate,
+    ) {
+        let mut scratch = self.calibration.clone();
         let mut status_of = |values: &[f64]| {
             let is_finite = values.iter().all(|value| value.is_finite());
             if is_finite { locate(values).status } else { Status::OutsideModel }
         };
-        for ((opposite, value), learnt) in scratch.as_mut().iter_mut().zip(tared).zip(self.learnt.as_ref()) {
+        for ((opposite, value), learnt) in
+            scratch.as_mut().iter_mut().zip(tared).zip(self.calibration.as_ref())
+        {
             *opposite = 2.0 * learnt - value;
         }
         self.let_go = next_in_row(self.let_go, is_contact(status_of(scratch.as_ref())));
         self.as_learnt = next_in_row(self.as_learnt, status_of(reading) == Status::NoContact);
         if self.as_learnt >= LET_GO {
-            self.current = Baseline::new(self.learnt.clone(), Self::SETTLED);
-            (self.is_confirmed, self.other) = (true, None);
+            self.current = Baseline::new(self.calibration.clone(), Self::SETTLED);
+            (self.is_confirmed, self.alternative) = (true, None);
             self.rest.forget_touch();
             self.as_learnt = 0;
             return;
@@ -392,33 +399,33 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             self.begin_at(reading);
             return;
         }
-        let status = self.other.as_ref().map_or(Status::OutsideModel, |other| {
-            other.take_off(reading, self.learnt.as_ref(), scratch.as_mut());
+        let status = self.alternative.as_ref().map_or(Status::OutsideModel, |other| {
+            other.subtract_baseline(reading, self.calibration.as_ref(), scratch.as_mut());
             status_of(scratch.as_ref())
         });
-        self.weigh_other(reading, status);
+        self.update_alternative(reading, status);
     }
 
     /// Updates, exchanges or replaces the alternative baseline.
-    fn weigh_other(&mut self, reading: &[f64], status: Status) {
-        if let Some(other) = &mut self.other {
+    fn update_alternative(&mut self, reading: &[f64], status: Status) {
+        if let Some(other) = &mut self.alternative {
             self.strange = next_in_row(self.strange, status == Status::OutsideModel);
             if status == Status::NoContact {
                 other.follow(reading, self.time_constant);
             }
             other.count(status);
-            if other.saw_a_whole_touch() {
+            if other.has_complete_touch() {
                 core::mem::swap(&mut self.current, other);
                 other.forget_touch();
                 self.rest.forget_touch();
                 (self.is_confirmed, self.let_go, self.as_learnt) = (true, 0, 0);
             }
         }
-        let is_wanting = self.other.as_ref().is_none_or(|other| {
+        let is_wanting = self.alternative.as_ref().is_none_or(|other| {
             status == Status::OutsideModel && (other.weight < Self::SETTLED || self.strange >= LET_GO)
         });
         if !self.is_confirmed && is_wanting && self.is_possible(reading) {
-            self.other = Some(self.baseline_at(reading));
+            self.alternative = Some(self.baseline_at(reading));
             self.strange = 0;
         }
     }
@@ -428,21 +435,21 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             return;
         }
         self.current = self.baseline_at(reading);
-        (self.is_confirmed, self.other) = (false, None);
+        (self.is_confirmed, self.alternative) = (false, None);
         self.rest.forget_touch();
         (self.let_go, self.as_learnt) = (0, 0);
     }
 
     fn baseline_at(&self, reading: &[f64]) -> Baseline<B> {
-        let mut baseline = Baseline::new(self.learnt.clone(), 0);
+        let mut baseline = Baseline::new(self.calibration.clone(), 0);
         baseline.average(reading, self.time_constant);
         baseline
     }
 
     fn has_drifted_to(&self, reading: &[f64]) -> bool {
-        self.drift.as_ref().is_some_and(|CalibrationDrift { last, reach }| {
-            let mut channels = reading.iter().zip(last.as_ref()).zip(reach.as_ref());
-            channels.all(|((value, last), reach)| (value - last).abs() <= *reach)
+        self.drift.as_ref().is_some_and(|CalibrationDrift { last, largest_changes }| {
+            let mut channels = reading.iter().zip(last.as_ref()).zip(largest_changes.as_ref());
+            channels.all(|((value, last), largest)| (value - last).abs() <= *largest)
         })
     }
 
@@ -467,7 +474,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
     }
 
     /// Extrapolates the drift, at most over as many readings as it was fitted to.
-    fn carry_drift_on(&mut self) {
+    fn extrapolate_drift(&mut self) {
         let is_known = self.weight >= DRIFT_KNOWN && self.carried < self.weight;
         if is_known || (self.weight > 0 && self.carried == 0) {
             self.carried += 1;
@@ -481,7 +488,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
         (self.since_rest, self.carried) = (readings, 0);
     }
 
-    fn take_off(&self, reading: &[f64], learnt: &[f64], tared: &mut [f64]) {
+    fn subtract_baseline(&self, reading: &[f64], learnt: &[f64], tared: &mut [f64]) {
         let baselines = self.values.as_ref().iter().zip(learnt);
         for ((tared, value), (baseline, learnt)) in tared.iter_mut().zip(reading).zip(baselines) {
             *tared = value - baseline + learnt;
@@ -495,7 +502,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Baseline<B> {
         }
     }
 
-    fn saw_a_whole_touch(&self) -> bool {
+    fn has_complete_touch(&self) -> bool {
         self.touched >= LET_GO && self.untouched >= LET_GO
     }
 
@@ -597,7 +604,7 @@ mod tests {
 
     fn follow(tare: &mut Tare<[f64; 4]>, reading: [f64; 4]) -> Estimate {
         let mut tared = [0.0; 4];
-        let estimate = tare.follow(&reading, &mut tared, locate).unwrap();
+        let estimate = tare.locate_and_update(&reading, &mut tared, locate).unwrap();
         assert!((tared[0] - reading[0]).abs() < 200.0);
         estimate
     }
@@ -765,7 +772,7 @@ mod tests {
                 MOVED[c] + drift * way * f64::from(number) + left * way
             });
             let mut tared = [0.0; 4];
-            tare.follow(&reading(number, moved, force, x), &mut tared, locate).unwrap().status
+            tare.locate_and_update(&reading(number, moved, force, x), &mut tared, locate).unwrap().status
         };
         for _ in 0..300 {
             next(&mut tare, 0.0, 0.0, 0.0);
@@ -838,7 +845,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_on_a_moved_board_from_its_start_on_may_be_touched_and_taken_off() {
+    fn object_on_a_moved_board_from_the_start_may_be_touched_and_removed() {
         let mut tare = Tare::new(LEARNT).unwrap();
         follow_many(&mut tare, 0..60, (0.0, 0.0));
         // A finger presses on the object first: that confirms the wrong baseline.
@@ -880,7 +887,7 @@ mod tests {
         let mut tare = Tare::new([0.0; 4]).unwrap();
         let mut tared = [0.0; 4];
         for _ in 0..100 {
-            let estimate = tare.follow(&[1e308; 4], &mut tared, |_| {
+            let estimate = tare.locate_and_update(&[1e308; 4], &mut tared, |_| {
                 Estimate::of_position(Position::along(0.5), Status::OutsideModel)
             });
             assert_eq!(estimate.unwrap().status, Status::OutsideModel);

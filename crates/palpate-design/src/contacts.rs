@@ -23,7 +23,7 @@ pub struct ContactPrior {
 
 impl ContactPrior {
     /// Creates contacts on the whole surface without its edge.
-    pub fn all_over(extent: Extent) -> Self {
+    pub fn over_surface(extent: Extent) -> Self {
         let every_m = spacing(extent, ALONG_A_LINE, ALONG_A_PLANE);
         let last = |size_m: f64| (size_m - every_m).max(0.5 * size_m);
         let first = |size_m: f64| every_m.min(0.5 * size_m);
@@ -54,7 +54,7 @@ pub(crate) fn check_positions(
     let outside = positions.into_iter().find(|position| !extent.contains(*position));
     let beyond = |at: Position| {
         let along = extent.contains(Position { y_m: 0.0, ..at });
-        OutOfRange { what, value: if along { at.y_m } else { at.x_m }, bound: "on the surface" }
+        OutOfRange { quantity: what, value: if along { at.y_m } else { at.x_m }, bound: "on the surface" }
     };
     outside.map_or(Ok(()), |at| Err(beyond(at)))
 }

@@ -1,6 +1,6 @@
 //! Errors of locators after simulated calibrations.
 
-use palpate_estimators::evaluation::{Evaluation, Located, median};
+use palpate_estimators::evaluation::{EvaluatedContact, Evaluation, median};
 use palpate_numerics::{mean, standard_error};
 use serde::Serialize;
 
@@ -43,8 +43,9 @@ impl Verification {
 
 pub(crate) fn errors_by_contact(calibration: &Evaluation, contacts: &WeightedContacts) -> Vec<f64> {
     let readings = calibration.located.len() / contacts.len();
-    let error_m =
-        |located: &[Located]| -> f64 { located.iter().map(|one| one.error_m() / readings as f64).sum() };
+    let error_m = |located: &[EvaluatedContact]| -> f64 {
+        located.iter().map(|one| one.error_m() / readings as f64).sum()
+    };
     calibration.located.chunks_exact(readings).map(error_m).collect()
 }
 

@@ -11,6 +11,7 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::FEWEST_FOR_95;
 use palpate_numerics::watch::{Cancelled, Watch};
 
+use crate::candidate_errors::CandidateErrors;
 use crate::fit_memo::FitMemo;
 use crate::interval_check::{HeldOutEstimate, IntervalCheck};
 pub use crate::locator_fault::LocatorFault;
@@ -18,9 +19,8 @@ use crate::offset_course::OffsetCourse;
 use crate::recording::{Provenance, Recording};
 use crate::setup::Setup;
 use crate::split::Split;
-use crate::status::{FalseAlarmRate, unless_left_open};
+use crate::status::{FalseAlarmRate, mark_undetermined};
 use crate::thinning::thinned;
-use crate::tried::Tried;
 use crate::untouched_drift::UntouchedDrift;
 use crate::untouched_scatter::{Deviations, UntouchedScatter};
 
@@ -187,7 +187,7 @@ pub trait Fit {
     /// # Errors
     /// Unsuitable recording or cancellation.
     fn fit_without_interval_check(&self, task: FitTask) -> Result<Fitted<Self::Method>, Self::Error> {
-        Ok(self.fit_alone(task)?.with_scatter_of(task.recording))
+        Ok(self.fit_unchecked(task)?.with_scatter_of(task.recording))
     }
 
     /// Returns the offsets at the rows of `asked` by the drift of the task's presses.
@@ -199,12 +199,12 @@ pub trait Fit {
     ///
     /// # Errors
     /// Unsuitable recording or cancellation.
-    fn fit_alone(&self, task: FitTask) -> Result<Fitted<Self::Method>, Self::Error> {
+    fn fit_unchecked(&self, task: FitTask) -> Result<Fitted<Self::Method>, Self::Error> {
         task.check_channels()?;
         Ok(Fitted::new(task, self.fit_method(task)?))
     }
 
-    /// Fits every seed of a queue, equal to [`Fit::fit_alone`]; some methods fit several at once.
+    /// Fits every seed of a queue, equal to [`Fit::fit_unchecked`]; some methods fit several at once.
     ///
     /// ```
     /// use palpate_estimators::fit::{Fit, FitTask, SeedList};
@@ -229,7 +229,7 @@ pub trait Fit {
         queue: &mut dyn SeedQueue<Fitted<Self::Method>>,
     ) -> Result<(), Self::Error> {
         while let Some(seed) = queue.next_seed() {
-            queue.fitted(seed, self.fit_alone(task.seed(seed))?);
+            queue.fitted(seed, self.fit_unchecked(task.seed(seed))?);
         }
         Ok(())
     }
@@ -268,7 +268,7 @@ fn check_intervals<E: Fit + ?Sized>(
     let folds = check_folds(recording.distinct_positions().len());
     let Ok(mut splits) = Split::by_folds(recording, folds) else { return Ok(None) };
     let drifts = estimator.drift_course(FitTask { recording, ..task }, recording).is_some();
-    for Split { training, judged, offsets, .. } in &mut splits {
+    for Split { training, held_out: judged, offsets, .. } in &mut splits {
         let kept: Vec<usize> = thinned(judged.rows.len(), MOST_PRESSES_CHECKED).collect();
         *judged = judged.subset(&kept);
         *offsets =
@@ -314,7 +314,7 @@ impl HoldOutTask<'_> {
     ) -> Result<HeldOut, HoldOutError<E>> {
         let Self { setup, splits, seed, clock, watch, memo } = *self;
         let mut held_out = HeldOut { estimates: Vec::new(), fitting_s: 0.0, locating_s: 0.0 };
-        for (fold, Split { training, judged, offsets, .. }) in splits.iter().enumerate() {
+        for (fold, Split { training, held_out: judged, offsets, .. }) in splits.iter().enumerate() {
             let start = clock();
             let task = FitTask { setup, recording: training, seed, watch, memo };
             let (locator, shared_s) = fit(fold, task).map_err(HoldOutError::Fit)?;
@@ -453,7 +453,7 @@ pub struct LocatorProvenance {
     pub recording: Provenance,
     /// Candidates of a choice, the chosen one first, by rising score.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub choice: Vec<Tried>,
+    pub choice: Vec<CandidateErrors>,
 }
 
 impl<M: Locate> Fitted<M> {
@@ -523,8 +523,8 @@ impl<M: Locate> Fitted<M> {
         self.by_scatter(limited(estimate, reading, &self.setup), reading)
     }
 
-    pub(crate) fn anywhere(&self) -> Estimate {
-        anywhere_on(self.setup.surface().extent())
+    pub(crate) fn whole_surface_estimate(&self) -> Estimate {
+        whole_surface_estimate_on(self.setup.surface().extent())
     }
 
     fn by_scatter(&self, estimate: Estimate, reading: &[f64]) -> Estimate {
@@ -600,9 +600,9 @@ pub(crate) const LARGEST: f64 = palpate_core::LARGEST_READING;
 /// Makes an estimate finite, and `located` only for a restricted position.
 fn limited(estimate: Estimate, reading: &[f64], setup: &Setup) -> Estimate {
     let extent = setup.surface().extent();
-    let is_absurd = |(value, sensor): (&f64, &Sensor)| value.abs() > LARGEST && !sensor.channel.dead;
+    let is_absurd = |(value, sensor): (&f64, &Sensor)| value.abs() > LARGEST && !sensor.channel.disabled;
     if reading.iter().zip(setup.layout().sensors()).any(is_absurd) {
-        return anywhere_on(extent);
+        return whole_surface_estimate_on(extent);
     }
     // Where every contact is infinitely far from a reading, no contact excludes another.
     let is_point = estimate.status == Status::OutsideModel
@@ -611,14 +611,14 @@ fn limited(estimate: Estimate, reading: &[f64], setup: &Setup) -> Estimate {
             .uncertainty
             .is_some_and(|uncertainty| uncertainty.x_95_m.0 >= uncertainty.x_95_m.1);
     if estimate.is_in_numbers() && !is_point {
-        unless_left_open(estimate, extent)
+        mark_undetermined(estimate, extent)
     } else {
-        anywhere_on(extent)
+        whole_surface_estimate_on(extent)
     }
 }
 
 /// Estimate `outside_model` in place of an infinite one.
-fn anywhere_on(extent: Extent) -> Estimate {
+fn whole_surface_estimate_on(extent: Extent) -> Estimate {
     let (length_m, width_m) = (extent.length_m(), extent.width_m().unwrap_or(0.0));
     let uniform = |side_m: f64| side_m * side_m / 12.0;
     let uncertainty = Uncertainty {

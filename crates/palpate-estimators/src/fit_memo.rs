@@ -11,10 +11,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Results of one task. The drift of a recording, its fit and those of its folds need the same ones.
 pub(crate) struct FitMemo<'a> {
     setup: &'a Setup,
-    results: Mutex<HashMap<(TypeId, u64), Stored>>,
+    results: Mutex<HashMap<(TypeId, u64), MemoEntry>>,
 }
 
-type Stored = Arc<dyn Any + Send + Sync>;
+type MemoEntry = Arc<dyn Any + Send + Sync>;
 
 impl<'a> FitMemo<'a> {
     pub fn new(setup: &'a Setup) -> Self {
@@ -43,7 +43,7 @@ impl<'a> FitMemo<'a> {
             return Ok(result);
         }
         let result = Arc::new(compute()?);
-        let stored: Stored = Arc::<T>::clone(&result);
+        let stored: MemoEntry = Arc::<T>::clone(&result);
         results().insert(key, stored);
         Ok(result)
     }

@@ -1,8 +1,8 @@
 //! Shared setups of tests, as in the examples.
 
-mod covered;
+mod coverage_tally;
 
-pub(crate) use covered::Covered;
+pub(crate) use coverage_tally::CoverageTally;
 
 use std::fs::File;
 
@@ -31,8 +31,8 @@ impl Example {
         self.setup.simulate(&self.training, seed).unwrap()
     }
 
-    pub fn pressed_setup(&self) -> Setup {
-        self.setup.pressed_by(&self.training).unwrap()
+    pub fn training_setup(&self) -> Setup {
+        self.setup.with_training_force(&self.training).unwrap()
     }
 }
 

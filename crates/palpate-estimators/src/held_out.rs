@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn too_few_errors_bound_nothing() {
+    fn too_few_errors_give_no_bound() {
         assert_eq!(HeldOutErrors::from_errors(&[[1.0, 0.0]; 18]), None);
         assert_eq!(HeldOutErrors::from_errors(&[[1.0, 0.0]; 19]).map(|s| s.half_95_m[0]), Some(1.0));
     }

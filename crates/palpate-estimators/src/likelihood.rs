@@ -27,7 +27,7 @@ pub(crate) struct UntouchedSurface {
 impl UntouchedSurface {
     /// Where a tracked walk dominates the scatter, the noise of two readings replaces it; walks of single
     /// channels are too uncertain to subtract.
-    pub fn beside_walk(
+    pub fn without_walk(
         scatter: Option<UntouchedScatter>,
         drift: Option<UntouchedDrift>,
         noise_sd: &[Option<f64>],
@@ -64,7 +64,7 @@ pub trait Likelihood: Send + Sync {
     fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>);
 
     /// Fits the surface without contacts at u = `mode_n` (see [`LineLikelihood`]).
-    fn fit_nothing(&self, whitened: &[f64], mode_n: f64) -> ContactFit<1>;
+    fn fit_untouched(&self, whitened: &[f64], mode_n: f64) -> ContactFit<1>;
 
     /// Returns Σ (W·f)²/σ² of a contact in balance.
     fn signal(&self, contact: Contact) -> f64;

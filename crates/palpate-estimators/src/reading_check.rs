@@ -194,7 +194,7 @@ impl CheckEstimate for ReadingCheck {
             Forward::Influence(influence) => influence.locate(reading),
             Forward::Digit(digit) => digit.locate(reading),
         };
-        self.left_by(explained, estimate, extent)
+        self.combine_estimates(explained, estimate, extent)
     }
 
     fn check_batch(&self, readings: &[f64], channels: usize, estimates: &mut [Estimate], extent: Extent) {
@@ -204,7 +204,7 @@ impl CheckEstimate for ReadingCheck {
             Forward::Digit(digit) => digit.locate_batch(readings, channels, &mut explained),
         }
         for (estimate, explained) in estimates.iter_mut().zip(explained) {
-            *estimate = self.left_by(explained, *estimate, extent);
+            *estimate = self.combine_estimates(explained, *estimate, extent);
         }
     }
 
@@ -217,7 +217,7 @@ impl CheckEstimate for ReadingCheck {
 }
 
 impl ReadingCheck {
-    fn left_by(&self, explained: Estimate, estimate: Estimate, extent: Extent) -> Estimate {
+    fn combine_estimates(&self, explained: Estimate, estimate: Estimate, extent: Extent) -> Estimate {
         let is_like_presses = self.own_intervals.is_some_and(|OwnIntervals { force_n }| {
             let told = force_n.zip(explained.contact.force_n);
             told.is_none_or(|((least, most), force_n)| (least..=most).contains(&force_n))

@@ -146,7 +146,7 @@ fn check_sensor(
         return Err(SetupError::NotAGauge { kind });
     }
     if !extent.contains(position) {
-        return Err(OffSurface { what: "sensor", number, position, extent }.into());
+        return Err(OffSurface { object: "sensor", number, position, extent }.into());
     }
     let Some(model) = surface.model() else { return Ok(()) };
     if kind == SensorKind::Raw {
@@ -327,9 +327,9 @@ impl Setup {
         OffSurface::check("sensor", &positions, self.surface.extent())
     }
 
-    /// Disables or enables a channel; see [`Layout::set_dead`].
-    pub fn set_dead(&mut self, channel: usize, dead: bool) {
-        self.layout.set_dead(channel, dead);
+    /// Disables or enables a channel; see [`Layout::set_disabled`].
+    pub fn set_disabled(&mut self, channel: usize, dead: bool) {
+        self.layout.set_disabled(channel, dead);
     }
 
     /// Sets the known force.

@@ -99,7 +99,7 @@ impl Setup {
     ///
     /// # Errors
     /// [`OutOfRange`].
-    pub fn pressed_by(&self, training: &Training) -> Result<Self, OutOfRange> {
+    pub fn with_training_force(&self, training: &Training) -> Result<Self, OutOfRange> {
         self.clone().with_force(training.force_n.or(self.force_n()))
     }
 
@@ -123,7 +123,7 @@ impl Setup {
         watch: Watch,
     ) -> Result<Recording, SimulateError> {
         let positions = training.positions(self.surface().extent())?;
-        let pressed = self.pressed_by(training)?;
+        let pressed = self.with_training_force(training)?;
         let contacts = contacts_at(&pressed, &positions)?;
         simulate_presses_watched(&pressed, &contacts, training.repeats, training.placement_sd_m, seed, watch)
     }

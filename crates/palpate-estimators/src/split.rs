@@ -9,7 +9,7 @@ pub struct Split {
     /// Recording to fit.
     pub training: Recording,
     /// Recording to judge by.
-    pub judged: Recording,
+    pub held_out: Recording,
     /// Offsets of the judged rows, to be replaced by learnt ones.
     pub offsets: Option<OffsetCourse>,
     /// Origin.
@@ -34,7 +34,7 @@ impl Split {
         let folds = recording.folds(folds)?;
         let split = |fold: &Fold| Self {
             training: recording.subset(&fold.training),
-            judged: recording.subset(&fold.held_out),
+            held_out: recording.subset(&fold.held_out),
             offsets: None,
             origin: SplitOrigin::Fold,
         };

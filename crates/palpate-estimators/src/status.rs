@@ -106,7 +106,7 @@ pub const PLACE_LEFT_OPEN: f64 = 0.95;
 
 /// Critical value of χ² with at least 1 degree of freedom, as bounds of force and surface restrict every
 /// contact.
-pub(crate) fn misfit_bound(freedom: usize) -> f64 {
+pub(crate) fn chi_squared_bound(freedom: usize) -> f64 {
     static KNOWN: [OnceLock<f64>; 65] = [const { OnceLock::new() }; 65];
     let freedom = freedom.max(1);
     let bound = || chi_squared_critical_value(OUTSIDE_MODEL_RATE, freedom);
@@ -131,7 +131,7 @@ fn detection_cost(contact_cost: f64, rate: FalseAlarmRate) -> f64 {
 }
 
 /// Bounds of at least twice the recording's 99th percentile, as real noise has longer tails.
-pub(crate) fn learnt_bounds<const N: usize>(
+pub(crate) fn recording_bounds<const N: usize>(
     normal: [f64; N],
     recording: &Recording,
     left: impl Fn(&[f64]) -> [f64; N],
@@ -166,7 +166,7 @@ pub(crate) struct StatusRule {
     noise_bound: f64,
     detection_cost: f64,
     contact_cost: f64,
-    misfit_bound: f64,
+    chi_squared_bound: f64,
 }
 
 impl StatusRule {
@@ -176,13 +176,18 @@ impl StatusRule {
             noise_bound: noise_bound(channels, rate),
             detection_cost: detection_cost(contact_cost, rate),
             contact_cost,
-            misfit_bound: misfit_bound(channels.saturating_sub(unknowns)),
+            chi_squared_bound: chi_squared_bound(channels.saturating_sub(unknowns)),
         }
     }
 
-    /// Only zeros are `no_contact`; χ² may be the share `misfit` of `square`.
-    pub fn without_noise(square: f64, misfit: f64) -> Self {
-        Self { noise_bound: 0.0, detection_cost: 0.0, contact_cost: 0.0, misfit_bound: misfit * square }
+    /// Only zeros are `no_contact`; χ² may be the share `chi_squared` of `square`.
+    pub fn without_noise(square: f64, chi_squared: f64) -> Self {
+        Self {
+            noise_bound: 0.0,
+            detection_cost: 0.0,
+            contact_cost: 0.0,
+            chi_squared_bound: chi_squared * square,
+        }
     }
 
     /// True where noise explains |d|² = `square`.
@@ -191,21 +196,21 @@ impl StatusRule {
         square <= self.noise_bound
     }
 
-    /// True where noise explains |d|² = `square`, no worse than χ² = `misfit`.
+    /// True where noise explains |d|² = `square`, no worse than χ² = `chi_squared`.
     #[inline(always)]
-    pub fn is_no_contact(&self, square: f64, misfit: f64) -> bool {
-        square <= misfit + self.detection_cost && self.is_within_noise(square)
+    pub fn is_no_contact(&self, square: f64, chi_squared: f64) -> bool {
+        square <= chi_squared + self.detection_cost && self.is_within_noise(square)
     }
 
     /// Reduction of `square`, less the one that detection needs.
-    pub fn taken_beyond_cost(&self, square: f64, misfit: f64) -> f64 {
-        square - misfit - self.detection_cost
+    pub fn net_reduction(&self, square: f64, chi_squared: f64) -> f64 {
+        square - chi_squared - self.detection_cost
     }
 
     /// True for an explained reading.
     #[inline(always)]
-    pub fn is_explained(&self, misfit: f64) -> bool {
-        misfit <= self.misfit_bound
+    pub fn is_explained(&self, chi_squared: f64) -> bool {
+        chi_squared <= self.chi_squared_bound
     }
 
     pub fn detection(&self, channels: usize, unknowns: usize) -> Detection {
@@ -340,7 +345,7 @@ fn simpson((from, to): (f64, f64), steps: usize, of: impl Fn(f64) -> f64) -> f64
 pub(crate) const NO_CONTACT: Estimate = Estimate::of_position(Position::along(0.0), Status::NoContact);
 
 /// Makes an undetermined estimate `ambiguous`.
-pub(crate) fn unless_left_open(estimate: Estimate, extent: Extent) -> Estimate {
+pub(crate) fn mark_undetermined(estimate: Estimate, extent: Extent) -> Estimate {
     let is_left_open = estimate.contact.uncertainty.is_some_and(|uncertainty| {
         let is_open = |(low, high): (f64, f64), side_m: f64| {
             high.min(side_m) - low.max(0.0) >= PLACE_LEFT_OPEN * side_m

@@ -1,8 +1,8 @@
 //! Errors of tracks and of single readings.
 
 use crate::estimator::{
-    ContactEstimate, Estimate, Locator, NotTrackable, SmoothTracker, Status, Track, TrackError, Tracked,
-    TrackerConfig,
+    ContactEstimate, Estimate, Locator, NotTrackable, SmoothTracker, Status, Track, TrackError,
+    TrackedContact, TrackerConfig,
 };
 use crate::evaluation::covered;
 use crate::recording::TimedRecording;
@@ -66,7 +66,7 @@ impl TrackErrors {
             let touching = truths.iter().filter(|truth| truth.force_n > 0.0);
             let truths: Vec<Position> = touching.map(|truth| truth.position).collect();
             readings += usize::from(!truths.is_empty());
-            let tracked: Vec<ContactEstimate> = one.contacts.iter().map(Tracked::estimate).collect();
+            let tracked: Vec<ContactEstimate> = one.contacts.iter().map(TrackedContact::estimate).collect();
             track.add(&truths, &tracked, extent);
             single.add(&truths, &contacts_of_single(&one.single, !truths.is_empty()), extent);
         }
@@ -98,7 +98,7 @@ fn contacts_of_single(estimate: &Estimate, touched: bool) -> Vec<ContactEstimate
 }
 
 /// Tracked contact of each true one; `None` if untouched or undetected.
-pub fn tracked_of(track: &Track, truths: &[Contact]) -> Vec<Option<Tracked>> {
+pub fn tracked_of(track: &Track, truths: &[Contact]) -> Vec<Option<TrackedContact>> {
     let touching: Vec<usize> = (0..truths.len()).filter(|i| truths[*i].force_n > 0.0).collect();
     let places: Vec<Position> = touching.iter().map(|i| truths[*i].position).collect();
     let found: Vec<Position> = track.contacts.iter().map(|tracked| tracked.estimate().position).collect();
@@ -138,7 +138,7 @@ fn choose(a: &[Position], b: &[Position], chosen: &mut Vec<usize>, sum: f64, bes
 
 /// Tracks of a recording.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Followed {
+pub struct RecordingTracks {
     /// Filtered tracks.
     pub filtered: Vec<Track>,
     /// Smoothed tracks.
@@ -147,7 +147,7 @@ pub struct Followed {
 
 /// Tracking error.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum FollowError {
+pub enum TrackingError {
     /// No likelihood.
     #[error(transparent)]
     NotTrackable(#[from] NotTrackable),
@@ -162,18 +162,18 @@ pub enum FollowError {
 /// Tracks the contacts of a recording.
 ///
 /// # Errors
-/// [`FollowError`].
-pub fn follow(
+/// [`TrackingError`].
+pub fn track_recording(
     locator: &Locator,
     config: TrackerConfig,
     recording: &TimedRecording,
-) -> Result<Followed, FollowError> {
+) -> Result<RecordingTracks, TrackingError> {
     let tracking = locator.tracking(&config)?;
     let mut tracker = SmoothTracker::new(tracking.likelihood(), config);
     for (row, time_s) in recording.recording.rows.iter().zip(&recording.times_s) {
-        tracker.follow(*time_s, &row.reading)?;
+        tracker.update(*time_s, &row.reading)?;
     }
-    Ok(Followed { smoothed: tracker.smoothed(Watch::NONE)?, filtered: tracker.filtered().to_vec() })
+    Ok(RecordingTracks { smoothed: tracker.smoothed(Watch::NONE)?, filtered: tracker.filtered().to_vec() })
 }
 
 /// Errors at one speed.
@@ -194,7 +194,7 @@ pub struct SpeedErrors {
 pub enum SweepError {
     /// Tracking error.
     #[error(transparent)]
-    Follow(#[from] FollowError),
+    Follow(#[from] TrackingError),
     /// Simulation error.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
@@ -225,7 +225,7 @@ pub fn sweep_speeds(
         let recording =
             simulate_moving(setup, &moving.at_speed(speed_m_per_s).map_err(SimulateError::from)?, seed)?;
         let truths = recording.truths();
-        let Followed { filtered, smoothed } = follow(locator, config, &recording)?;
+        let RecordingTracks { filtered, smoothed } = track_recording(locator, config, &recording)?;
         let errors =
             TrackErrors::new(&filtered, &truths, extent).zip(TrackErrors::new(&smoothed, &truths, extent));
         sweep.extend(errors.map(|(filtered, smoothed)| SpeedErrors {

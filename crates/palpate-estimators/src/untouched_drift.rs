@@ -67,9 +67,13 @@ impl UntouchedDrift {
     }
 
     /// Returns the largest change that counts as drift; infinite for disabled channels.
-    pub fn reach(&self, layout: &Layout) -> Vec<f64> {
+    pub fn largest_changes(&self, layout: &Layout) -> Vec<f64> {
         let reach = |(range, dead): (&f64, bool)| if dead { f64::INFINITY } else { *range };
-        self.range.iter().zip(layout.sensors().iter().map(|sensor| sensor.channel.dead)).map(reach).collect()
+        self.range
+            .iter()
+            .zip(layout.sensors().iter().map(|sensor| sensor.channel.disabled))
+            .map(reach)
+            .collect()
     }
 
     /// Checks values from a file.

@@ -41,7 +41,7 @@ pub(crate) const FEWEST_RESTS: usize = 5;
 pub(crate) struct Deviations {
     rows: Vec<(Vec<f64>, f64)>,
     /// ν.
-    freedom: f64,
+    degrees_of_freedom: f64,
     /// Repeats that scatter no more than the rests.
     noise: Option<Box<Self>>,
 }
@@ -86,7 +86,7 @@ impl Deviations {
             };
             group.iter().filter(move |_| share > 0.0).map(move |row| (off(row), share))
         });
-        Some(Self { rows: deviations.collect(), freedom: freedom as f64, noise: None })
+        Some(Self { rows: deviations.collect(), degrees_of_freedom: freedom as f64, noise: None })
     }
 
     fn new(recording: &Recording, rests: &[Vec<usize>]) -> Option<Self> {
@@ -105,7 +105,11 @@ impl Deviations {
             let values = recording.rows[row].reading.iter().zip(&lines);
             (values.map(|(value, [level, slope])| value - level - slope * times_s[row]).collect(), share)
         });
-        Some(Self { rows: deviations.collect(), freedom: (rests.len() - Self::OF_LINE) as f64, noise: None })
+        Some(Self {
+            rows: deviations.collect(),
+            degrees_of_freedom: (rests.len() - Self::OF_LINE) as f64,
+            noise: None,
+        })
     }
 
     /// True for normal noise at the 5 % level.
@@ -115,7 +119,7 @@ impl Deviations {
         let square =
             |row: &[f64]| -> f64 { channels.iter().map(|(channel, sd)| (row[*channel] / sd).powi(2)).sum() };
         let sum: f64 = self.rows.iter().map(|(row, share)| share * square(row)).sum();
-        let of_all = channels.len() as f64 * self.freedom;
+        let of_all = channels.len() as f64 * self.degrees_of_freedom;
         sum <= of_all + normal_quantile(1.0 - SIGNIFICANCE) * (2.0 * of_all).sqrt()
             && self.heavy_tails(&channels.iter().map(|(channel, _)| *channel).collect::<Vec<_>>()).is_none()
     }
@@ -133,8 +137,9 @@ impl Deviations {
             .filter_map(|c| Some(spread(repeats, c)? / spread(self, c)?))
             .filter(|ratio| ratio.is_finite())
             .collect();
-        let variance =
-            relative_variance * (self.freedom.recip() + repeats.freedom.recip()) / ratios.len() as f64;
+        let variance = relative_variance
+            * (self.degrees_of_freedom.recip() + repeats.degrees_of_freedom.recip())
+            / ratios.len() as f64;
         mean(ratios) <= 1.0 + normal_quantile(1.0 - SIGNIFICANCE) * variance.sqrt()
     }
 
@@ -152,18 +157,18 @@ impl Deviations {
     }
 
     fn product(&self, a: usize, b: usize) -> f64 {
-        self.rows.iter().map(|(row, share)| share * row[a] * row[b]).sum::<f64>() / self.freedom
+        self.rows.iter().map(|(row, share)| share * row[a] * row[b]).sum::<f64>() / self.degrees_of_freedom
     }
 
     pub fn scatter(&self, centre: Vec<f64>, layout: &Layout, rate: FalseAlarmRate) -> UntouchedScatter {
-        let is_live = |c: usize| !layout.sensors()[c].channel.dead;
+        let is_live = |c: usize| !layout.sensors()[c].channel.disabled;
         let variances: Vec<f64> =
             (0..layout.len()).map(|c| if is_live(c) { self.product(c, c) } else { 0.0 }).collect();
         let changing: Vec<usize> = (0..layout.len()).filter(|c| variances[*c] > 0.0).collect();
         let correlation = |a: usize, b: usize| self.product(a, b) / (variances[a] * variances[b]).sqrt();
         let correlations: Vec<Vec<f64>> =
             changing.iter().map(|a| changing.iter().map(|b| correlation(*a, *b)).collect()).collect();
-        let of_normal = critical_value(&correlations, self.freedom, rate);
+        let of_normal = critical_value(&correlations, self.degrees_of_freedom, rate);
         let bound = self.heavy_tails(&changing).map_or(of_normal, |(tails, share)| {
             of_normal.max(tails.bound(changing.len(), share, rate.share()))
         });

@@ -5,9 +5,9 @@ use cpu_time::ProcessTime;
 use palpate_estimators::estimator::{Creep, Drift, Locator, TrackerConfig};
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::imperfections::{Imperfections, Relaxation};
-use palpate_live::input::{Arrival, Arrived};
+use palpate_live::input::{Arrival, TimedArrival};
 use palpate_live::sample::Sample;
-use palpate_live::session::{Follower, Output, Session, SessionConfig};
+use palpate_live::session::{EstimateTracker, Output, Session, SessionConfig};
 use palpate_live::simulated_board::{BoardConfig, FaultConfig, Finger, SimulatedBoard};
 use palpate_live::stamp::Stamp;
 use palpate_rig::Rig;
@@ -44,11 +44,11 @@ fn states() -> [(&'static str, TrackerConfig); 3] {
 }
 
 fn readings_per_s(locator: &Locator, config: TrackerConfig, samples: &[Sample]) -> f64 {
-    let mut follower = Follower::new(locator, config).expect("an influence locator");
+    let mut follower = EstimateTracker::new(locator, config).expect("an influence locator");
     let start = ProcessTime::now();
     for sample in samples {
         let Sample { unix_ns, reading, tared, estimate, .. } = sample;
-        std::hint::black_box(follower.follow(*unix_ns, reading, tared, *estimate));
+        std::hint::black_box(follower.update(*unix_ns, reading, tared, *estimate));
     }
     samples.len() as f64 / start.elapsed().as_secs_f64()
 }
@@ -64,18 +64,18 @@ fn samples(rig: &Rig, locator: &Locator) -> Vec<Sample> {
     let mut board = board.with_faults(faults, 0).expect("faults in their ranges");
     let mut session = Session::new(locator, &SessionConfig::default()).expect("each reading by itself");
     let mut out = Vec::new();
-    board.finger_mut().obey("lift").expect("a line of the finger");
+    board.finger_mut().execute("lift").expect("a line of the finger");
     for frame in 0..((UNTOUCHED_S + HELD_S + AFTER_S) * RATE_HZ) as u32 {
         if frame == (UNTOUCHED_S * RATE_HZ) as u32 {
-            board.finger_mut().obey("finger 160 0 3").expect("a line of the finger");
+            board.finger_mut().execute("finger 160 0 3").expect("a line of the finger");
         }
         if frame == ((UNTOUCHED_S + HELD_S) * RATE_HZ) as u32 {
-            board.finger_mut().obey("lift").expect("a line of the finger");
+            board.finger_mut().execute("lift").expect("a line of the finger");
         }
         let elapsed = board.next_at();
         let arrival = Arrival::Bytes(board.send_until(elapsed));
         let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
-        session.receive(&Arrived { at, arrival }, &mut out);
+        session.receive(&TimedArrival { at, arrival }, &mut out);
     }
     out.into_iter()
         .filter_map(|output| match output {

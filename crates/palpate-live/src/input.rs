@@ -6,7 +6,7 @@ use crate::stamp::Stamp;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Input {
     /// An arrival.
-    Arrived(Arrived),
+    Arrived(TimedArrival),
     /// A command.
     Command(Command),
     /// End of the session.
@@ -36,7 +36,7 @@ pub enum Arrival {
 
 /// An arrival with its instant.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Arrived {
+pub struct TimedArrival {
     /// Instant of the last byte.
     pub at: Stamp,
     /// The arrival.

@@ -1,7 +1,7 @@
 //! Monitor of a board without a rig.
 
 use crate::frame::{BadFrame, Channel, Decoder, Frame, is_reserved, quote};
-use crate::input::{Arrival, Arrived};
+use crate::input::{Arrival, TimedArrival};
 use palpate_mechanics::units::Unit;
 use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
@@ -68,7 +68,7 @@ pub struct MonitorRecord {
 #[derive(Debug, Default)]
 pub struct Monitor {
     source: Option<String>,
-    lost: Option<String>,
+    failure: Option<String>,
     lines: VecDeque<RawLine>,
     partial: Vec<u8>,
     bytes: u64,
@@ -91,15 +91,15 @@ struct DetectedFrames {
 
 impl Monitor {
     /// Adds an arrival.
-    pub fn receive(&mut self, arrived: &Arrived) {
+    pub fn receive(&mut self, arrived: &TimedArrival) {
         let time_s = arrived.at.unix_ns as f64 * 1e-9;
         match &arrived.arrival {
             Arrival::Opened(name) | Arrival::Joined(name) | Arrival::Piped(name) => {
-                (self.source, self.lost) = (Some(name.clone()), None);
+                (self.source, self.failure) = (Some(name.clone()), None);
                 self.partial.clear();
             }
-            Arrival::Lost(why) => (self.source, self.lost) = (None, Some(why.clone())),
-            Arrival::Ended => (self.source, self.lost) = (None, Some("the source has ended".to_owned())),
+            Arrival::Lost(why) => (self.source, self.failure) = (None, Some(why.clone())),
+            Arrival::Ended => (self.source, self.failure) = (None, Some("the source has ended".to_owned())),
             Arrival::Bytes(bytes) | Arrival::Backlog(bytes) => {
                 self.receive_bytes(bytes, time_s, arrived.at.elapsed);
             }
@@ -256,7 +256,7 @@ impl Monitor {
     }
 
     fn problem(&self) -> Option<String> {
-        if let Some(lost) = &self.lost {
+        if let Some(lost) = &self.failure {
             return Some(lost.clone());
         }
         self.source.as_ref()?;
@@ -401,9 +401,9 @@ mod tests {
     use crate::frame::encode_into;
     use crate::stamp::Stamp;
 
-    fn arrived(ms: u64, arrival: Arrival) -> Arrived {
+    fn arrived(ms: u64, arrival: Arrival) -> TimedArrival {
         let at = Stamp { elapsed: Duration::from_millis(ms), unix_ns: ms * 1_000_000 };
-        Arrived { at, arrival }
+        TimedArrival { at, arrival }
     }
 
     fn of_lines(lines: &[&str]) -> Monitor {
@@ -505,7 +505,7 @@ mod tests {
     }
 
     #[test]
-    fn says_why_there_are_no_readings() {
+    fn reports_why_no_readings_arrive() {
         let problem = |monitor: &Monitor| monitor.record(Duration::ZERO).problem.unwrap_or_default();
         assert!(problem(&of_lines(&[])).contains("sends no data"));
         assert!(problem(&of_lines(&["hello\n", "world\n"])).contains("without values"));

@@ -74,7 +74,7 @@ pub fn run(
         if let Some(text) = feed.report(now.elapsed, session.frames()) {
             session.command(now, Command::Trouble(text), &mut outputs);
         }
-        give(outputs, sinks);
+        write_outputs(outputs, sinks);
         if Instant::now() >= next_state || !goes_on {
             let state = Arc::new(state(session, source.as_deref()));
             sinks.iter_mut().for_each(|sink| sink.state(&state));
@@ -86,7 +86,7 @@ pub fn run(
     }
 }
 
-fn give(outputs: Vec<Output>, sinks: &mut [Box<dyn Sink>]) {
+fn write_outputs(outputs: Vec<Output>, sinks: &mut [Box<dyn Sink>]) {
     if !outputs.is_empty() {
         let batch = Arc::new(Batch { outputs });
         sinks.iter_mut().for_each(|sink| sink.batch(&batch));

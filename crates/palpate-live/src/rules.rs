@@ -183,7 +183,7 @@ impl Rules {
     }
 
     /// First rule with a band of forces, for a locator that
-    /// [estimates the force](palpate_estimators::estimator::Locator::tells_force).
+    /// [estimates the force](palpate_estimators::estimator::Locator::estimates_force).
     pub fn first_of_force(&self) -> Option<&Rule> {
         let asks = |rule: &&Rule| matches!(rule.condition, Condition::Contact { force_n: Some(_), .. });
         self.0.iter().find(asks)
@@ -220,7 +220,7 @@ impl Rules {
             ));
         }
         match self.first_of_force() {
-            Some(rule) if !locator.tells_force() => {
+            Some(rule) if !locator.estimates_force() => {
                 Err(format!("rule `{}` requires a `force`, which this locator does not estimate", rule.name))
             }
             _ => Ok(()),
@@ -467,7 +467,7 @@ impl RuleWatch {
         for (rule, state) in self.rules.0.iter().zip(&mut self.states) {
             let acts = match (output, &rule.condition) {
                 (Output::Sample(sample), condition @ Condition::Contact { hold, .. }) => {
-                    state.next(sample.arrived, *hold, condition.holds(sample))
+                    state.next(sample.arrived, *hold, condition.is_met(sample))
                 }
                 (Output::Event(event), Condition::Event(name)) => is_called(event, name),
                 _ => false,
@@ -495,7 +495,7 @@ impl State {
 }
 
 impl Condition {
-    fn holds(&self, sample: &Sample) -> bool {
+    fn is_met(&self, sample: &Sample) -> bool {
         let estimate = &sample.estimate;
         let touches = matches!(estimate.status, Status::Located | Status::Ambiguous);
         touches
@@ -626,7 +626,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named_at_its_place() {
+    fn errors_are_reported_at_their_place() {
         let cases = [
             (r#"x = ["5 mm", "1 mm"]"#, r#"["5 mm", "1 mm"]"#),
             (r#"x = ["5 N", "1 mm"]"#, r#""5 N""#),

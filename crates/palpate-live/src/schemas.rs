@@ -92,7 +92,7 @@ mod tests {
     use rand_xoshiro::Xoshiro256PlusPlus;
 
     #[test]
-    fn what_a_board_sent_is_read_again_to_the_last_bit() {
+    fn sent_readings_are_read_again_bit_for_bit() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
         for factor in [1.0, 1e-3, 1e-6, 1e-9, std::f64::consts::PI / 180.0, 0.0254, 4.448_221_615_260_5] {
             for _ in 0..20_000 {

@@ -7,7 +7,7 @@ use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::SimulatedBench;
 
-use palpate_live::calibration::{Doubt, Guide, Press, Progress, RestingRow, Waiting};
+use palpate_live::calibration::{AwaitedStep, Guide, Press, Progress, RestingRow, RetakeReason};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_rig::Rig;
 use rand::SeedableRng;
@@ -56,12 +56,12 @@ impl<'a> Hand<'a> {
                 Progress::Waits(_) | Progress::None => {}
                 other => panic!("{other:?}"),
             }
-            self.contact = match guide.waiting() {
-                Waiting::Press | Waiting::Rest => guide
+            self.contact = match guide.awaited_step() {
+                AwaitedStep::Press | AwaitedStep::Rest => guide
                     .next_press()
                     .map(|(_, press)| Contact { position: press.position, force_n: FORCE_N }),
-                Waiting::Untouched | Waiting::Release => None,
-                Waiting::Nothing => break,
+                AwaitedStep::Untouched | AwaitedStep::Release => None,
+                AwaitedStep::Nothing => break,
             };
         }
         rows
@@ -92,7 +92,7 @@ fn presses_are_taken_at_rest_and_the_locator_is_near_the_limit() {
     let mut guide = Guide::new(plan.clone());
     let mut hand = Hand::new(&rig.setup);
     let rows = hand.obey(&mut guide, 100_000);
-    assert_eq!(guide.waiting(), Waiting::Nothing);
+    assert_eq!(guide.awaited_step(), AwaitedStep::Nothing);
     let presses: Vec<&RestingRow> = rows.iter().filter(|taken| taken.row.touches()).collect();
     assert_eq!(presses.len(), plan.len());
     // An untouched row before the first press, and one after each.
@@ -174,13 +174,13 @@ fn presses_can_be_taken_back_left_out_and_ended() {
         hand.obey(&mut guide, 1);
     }
     assert!(guide.redo() && guide.next_press().unwrap().0 == 0);
-    assert_eq!(guide.waiting(), Waiting::Release, "the press that was taken back is still held");
+    assert_eq!(guide.awaited_step(), AwaitedStep::Release, "the press that was taken back is still held");
     guide.skip();
     assert_eq!(guide.plan().len(), 8);
     let rows = hand.obey(&mut guide, 2000);
     assert!(rows.iter().filter(|taken| taken.row.touches()).count() >= 2);
     guide.stop();
-    assert_eq!((guide.waiting(), guide.next_press()), (Waiting::Nothing, None));
+    assert_eq!((guide.awaited_step(), guide.next_press()), (AwaitedStep::Nothing, None));
     guide.extend([Press { position: Position::along(0.2), force_n: Some(FORCE_N), depth_m: None }]);
     assert_eq!(hand.obey(&mut guide, 2000).iter().filter(|taken| taken.row.touches()).count(), 1);
 }
@@ -197,7 +197,7 @@ fn a_surface_that_is_touched_or_never_rests_is_not_taken() {
         let (at, reading) = hand.reading();
         assert_eq!(guide.add(at, &reading), Progress::None, "{i}");
     }
-    assert_eq!(guide.waiting(), Waiting::Untouched);
+    assert_eq!(guide.awaited_step(), AwaitedStep::Untouched);
 }
 
 #[test]
@@ -205,7 +205,7 @@ fn a_press_that_is_held_for_long_is_not_taken_for_an_untouched_surface() {
     let rig = Rig::from_toml(RIG).unwrap();
     let mut guide = Guide::new(plan(&rig)[..2].to_vec());
     let mut hand = Hand::new(&rig.setup);
-    while guide.waiting() != Waiting::Release {
+    while guide.awaited_step() != AwaitedStep::Release {
         hand.obey(&mut guide, 1);
     }
     let position = guide.plan()[0].position;
@@ -214,7 +214,7 @@ fn a_press_that_is_held_for_long_is_not_taken_for_an_untouched_surface() {
         let (at, reading) = hand.reading();
         assert_eq!(guide.add(at, &reading), Progress::None);
     }
-    assert_eq!(guide.waiting(), Waiting::Release);
+    assert_eq!(guide.awaited_step(), AwaitedStep::Release);
 }
 
 /// Readings of two channels at 100 Hz with a standard deviation of 1 about a mean that is a function of the time in seconds.
@@ -268,7 +268,7 @@ fn a_firm_press_replaces_a_light_touch_before_it() {
         }
     }
     assert!(replaced.is_some_and(|mean| (mean - 3000.0).abs() < 5.0), "{replaced:?}");
-    assert_eq!((guide.waiting(), guide.taken()), (Waiting::Press, 1));
+    assert_eq!((guide.awaited_step(), guide.taken()), (AwaitedStep::Press, 1));
 }
 
 #[test]
@@ -292,9 +292,9 @@ fn a_press_that_grows_and_is_lifted_at_once_is_taken_back() {
             _ => {}
         }
     }
-    assert_eq!(taken_back, [Doubt::Grew]);
+    assert_eq!(taken_back, [RetakeReason::Grew]);
     assert!(matches!(recorded[..], [mean] if (mean - 3000.0).abs() < 5.0), "{recorded:?}");
-    assert_eq!((guide.waiting(), guide.taken()), (Waiting::Press, 1));
+    assert_eq!((guide.awaited_step(), guide.taken()), (AwaitedStep::Press, 1));
 }
 
 #[test]
@@ -305,14 +305,14 @@ fn a_touch_that_stays_is_released_by_learning_the_untouched_reading_anew() {
     for (at, reading) in course(4, 20.0, |s| [step(s), step(s)]) {
         guide.add(at, &reading);
     }
-    assert_eq!(guide.waiting(), Waiting::Release);
+    assert_eq!(guide.awaited_step(), AwaitedStep::Release);
     assert!(guide.explain().unwrap().contains("100 % of the press"), "{:?}", guide.explain());
     assert!(guide.redo());
     guide.relearn();
     for (at, reading) in course(5, 3.0, |_| [300.0, 300.0]) {
         guide.add(at + Duration::from_secs(20), &reading);
     }
-    assert_eq!((guide.waiting(), guide.taken()), (Waiting::Press, 0));
+    assert_eq!((guide.awaited_step(), guide.taken()), (AwaitedStep::Press, 0));
 }
 
 #[test]
@@ -332,7 +332,7 @@ fn a_press_far_off_its_repeats_is_asked_for_again_and_confirmed_by_a_second_one(
     }
     assert_eq!(sizes, [30.0, 18.0, 30.0]);
     assert!(
-        matches!(doubts[..], [Doubt::OffRepeats { percent }] if (percent - 40.0).abs() < 1.0),
+        matches!(doubts[..], [RetakeReason::OffRepeats { percent }] if (percent - 40.0).abs() < 1.0),
         "{doubts:?}"
     );
 }
@@ -356,10 +356,11 @@ fn a_quick_repeat_of_a_press_is_no_drift() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(8);
     // A finger without any delay.
     for i in 0..2000 {
-        let mean = if matches!(guide.waiting(), Waiting::Press | Waiting::Rest) { 3000.0 } else { 0.0 };
+        let mean =
+            if matches!(guide.awaited_step(), AwaitedStep::Press | AwaitedStep::Rest) { 3000.0 } else { 0.0 };
         let reading = [(); 2].map(|()| mean + Distribution::<f64>::sample(&StandardNormal, &mut rng));
         let progress = guide.add(Duration::from_millis(10 * i), &reading);
         assert!(!matches!(progress, Progress::AskedAgain(_)), "{progress:?}");
     }
-    assert_eq!(guide.waiting(), Waiting::Nothing);
+    assert_eq!(guide.awaited_step(), AwaitedStep::Nothing);
 }

@@ -7,13 +7,13 @@ use palpate_estimators::imperfections::{Amount, Imperfections, OffsetDrift, Rela
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::SimulatedBench;
-use palpate_live::calibration::{Calibration, DepthKnowledge, Journal, Note, Waiting, Weights, plan};
+use palpate_live::calibration::{AwaitedStep, Calibration, DepthKnowledge, Journal, Note, Weights, plan};
 use palpate_live::event::Event;
 use palpate_live::frame::Channel;
-use palpate_live::input::{Arrival, Arrived, Command};
+use palpate_live::input::{Arrival, Command, TimedArrival};
 use palpate_live::session::{Output, Session, SessionConfig};
 use palpate_live::simulated_board::{
-    BoardConfig, FaultConfig, Finger, Hand, HandStyle, Instruction, SimulatedBoard,
+    BoardConfig, FaultConfig, Finger, HandStyle, Instruction, SimulatedBoard, SimulatedHand,
 };
 use palpate_live::stamp::{HostClock, Stamp};
 use palpate_mechanics::contact::{Contact, Position};
@@ -78,7 +78,7 @@ fn imperfect(imperfections: Imperfections) -> FaultConfig {
 struct Bench<'a> {
     rig: &'a Rig,
     board: SimulatedBoard<'a>,
-    hand: Hand,
+    hand: SimulatedHand,
     start: Stamp,
 }
 
@@ -88,17 +88,17 @@ impl<'a> Bench<'a> {
         let finger = Finger::random(rig, seed);
         let board = SimulatedBoard::new(&rig.setup, &config, finger).unwrap();
         let board = board.with_faults(faults, seed).unwrap();
-        let hand = Hand::new(style, rig.setup.surface().extent(), seed);
+        let hand = SimulatedHand::new(style, rig.setup.surface().extent(), seed);
         Self { rig, board, hand, start: HostClock::new().now() }
     }
 
     /// The next frame, and the contact during its reading.
-    fn next(&mut self, instruction: Instruction) -> (Arrived, Option<Contact>) {
+    fn next(&mut self, instruction: Instruction) -> (TimedArrival, Option<Contact>) {
         let elapsed = self.board.next_at();
         let contact = self.hand.contact_at(elapsed.as_secs_f64(), instruction);
-        self.board.finger_mut().hold(contact);
+        self.board.finger_mut().set_contact(contact);
         let arrival = Arrival::Bytes(self.board.next_frame().unwrap_or_default());
-        (Arrived { at: Stamp { elapsed, ..self.start }, arrival }, contact)
+        (TimedArrival { at: Stamp { elapsed, ..self.start }, arrival }, contact)
     }
 
     /// A guided calibration, with its outcome, and the contact at every reading, on the time scale of the rows.
@@ -111,18 +111,18 @@ impl<'a> Bench<'a> {
         let mut calibration = Calibration::new(setup, None, &[], plan, journal).unwrap();
         let mut outcome = Outcome::default();
         let mut contacts = Vec::new();
-        let (mut waiting, mut since) = (Waiting::Untouched, Duration::ZERO);
+        let (mut waiting, mut since) = (AwaitedStep::Untouched, Duration::ZERO);
         for _ in 0..400_000 {
             let guide = calibration.guide();
-            let instruction = match (guide.waiting(), guide.next_press()) {
-                (Waiting::Press, Some((_, press))) => {
+            let instruction = match (guide.awaited_step(), guide.next_press()) {
+                (AwaitedStep::Press, Some((_, press))) => {
                     Instruction::Press(Contact { position: press.position, force_n: FORCE_N })
                 }
-                (Waiting::Rest, _) => Instruction::Hold,
+                (AwaitedStep::Rest, _) => Instruction::Hold,
                 _ => Instruction::Lift,
             };
-            let is_next_step = guide.waiting() != waiting;
-            waiting = guide.waiting();
+            let is_next_step = guide.awaited_step() != waiting;
+            waiting = guide.awaited_step();
             let (arrived, contact) = self.next(instruction);
             let now = arrived.at.elapsed;
             if is_next_step {
@@ -134,11 +134,11 @@ impl<'a> Bench<'a> {
             calibration.receive(&arrived, &mut notes).unwrap();
             outcome.repeats_noted += notes.iter().filter(|note| **note == Note::RepeatedReadings).count();
             outcome.asked_again += notes.iter().filter(|note| matches!(note, Note::AskedAgain(_))).count();
-            if waiting == Waiting::Nothing || now > Duration::from_secs(1000) {
+            if waiting == AwaitedStep::Nothing || now > Duration::from_secs(1000) {
                 break;
             }
         }
-        outcome.is_finished = calibration.guide().waiting() == Waiting::Nothing;
+        outcome.is_finished = calibration.guide().awaited_step() == AwaitedStep::Nothing;
         (calibration, outcome, contacts)
     }
 }
@@ -321,7 +321,7 @@ fn a_session_after_a_drifting_calibration_begins_untouched() {
         for _ in 0..3000 {
             bench.next(Instruction::Lift);
         }
-        let untouched: Vec<Arrived> = (0..500).map(|_| bench.next(Instruction::Lift).0).collect();
+        let untouched: Vec<TimedArrival> = (0..500).map(|_| bench.next(Instruction::Lift).0).collect();
         let contacts = contacts_of(&locator, &untouched);
         assert!(contacts <= 5, "{contacts} of 500 untouched readings are contacts");
         let unaware = Locator { untouched_drift: None, ..locator };
@@ -331,7 +331,7 @@ fn a_session_after_a_drifting_calibration_begins_untouched() {
 }
 
 /// Readings of a session with another status than `no_contact`.
-fn contacts_of(locator: &Locator, arrived: &[Arrived]) -> usize {
+fn contacts_of(locator: &Locator, arrived: &[TimedArrival]) -> usize {
     let mut session = Session::new(locator, &SessionConfig::default()).unwrap();
     let mut out = Vec::new();
     arrived.iter().for_each(|arrived| session.receive(arrived, &mut out));

@@ -3,7 +3,7 @@
 use palpate_estimators::estimate_record::EstimateRecord;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::fit::{Fit, FitTask};
-use palpate_live::input::{Arrival, Arrived, Command, Input};
+use palpate_live::input::{Arrival, Command, Input, TimedArrival};
 use palpate_live::recording::{self, Playback, Recorded, RecordingError, RecordingSwitch};
 use palpate_live::sample::Sample;
 use palpate_live::session::{Estimation, Session, SessionConfig};
@@ -50,7 +50,7 @@ fn session(rig: &Rig, locator: &Locator, frames: u64, sink: &mut impl Sink) -> V
         let at = Stamp { elapsed, unix_ns: START_NS + elapsed.as_nanos() as u64 };
         let arrival = Arrival::Bytes(board.send_until(elapsed));
         let mut outputs = Vec::new();
-        session.receive(&Arrived { at, arrival }, &mut outputs);
+        session.receive(&TimedArrival { at, arrival }, &mut outputs);
         if frame == 10 {
             session.command(at, Command::Mark("ten".to_owned()), &mut outputs);
         }
@@ -70,7 +70,7 @@ fn all(path: &Path) -> Vec<Recorded> {
     while let Some(recorded) = playback.next_recorded().unwrap() {
         all.push(recorded);
     }
-    assert_eq!(playback.passed_over().loss(), None);
+    assert_eq!(playback.skipped().loss(), None);
     all
 }
 
@@ -181,7 +181,7 @@ fn recordings_without_an_instant_are_listed_last() {
 }
 
 #[test]
-fn nothing_is_written_over_and_names_get_a_number() {
+fn recordings_are_never_overwritten_and_names_get_a_number() {
     let folder = folder("recording-names");
     let (_, locator) = bench();
     let (switch, _reports) = switch(&locator);
@@ -237,7 +237,7 @@ impl Drop for SmallDisk {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_full_disk_is_told_and_the_recording_goes_on_when_there_is_room() {
+fn full_disk_is_reported_and_the_recording_resumes_with_space() {
     let Some(disk) = SmallDisk::mount(folder("recording-full")) else {
         println!("skipped: a small disk can only be mounted by root");
         return;

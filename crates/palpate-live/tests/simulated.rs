@@ -6,7 +6,7 @@ use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::imperfections::{Amount, Imperfections, OffsetDrift, Relaxation};
 use palpate_live::event::Event;
 use palpate_live::feed::FeedWatch;
-use palpate_live::input::{Arrival, Arrived};
+use palpate_live::input::{Arrival, TimedArrival};
 use palpate_live::sample::Sample;
 use palpate_live::session::{CreepConfig, Estimation, Output, Session, SessionConfig};
 use palpate_live::simulated_board::{BoardConfig, FaultConfig, Finger, FrameForm, SimulatedBoard};
@@ -40,7 +40,7 @@ fn a_finger_is_followed_from_touch_down_to_lift_off() {
         let elapsed = board.next_at();
         let bytes = board.send_until(elapsed);
         let at = Stamp { elapsed, unix_ns: start_ns + elapsed.as_nanos() as u64 };
-        session.receive(&Arrived { at, arrival: Arrival::Bytes(bytes) }, &mut out);
+        session.receive(&TimedArrival { at, arrival: Arrival::Bytes(bytes) }, &mut out);
         let truth = finger.contact_at(elapsed.as_secs_f64());
         for output in out.drain(..) {
             match output {
@@ -86,7 +86,7 @@ fn a_board_that_repeats_its_readings_is_named_once_and_its_noise_learnt_from_eac
         for repeat in 0..4_u64 {
             let elapsed = taken + Duration::from_micros(2500 * repeat);
             let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
-            session.receive(&Arrived { at, arrival: Arrival::Bytes(bytes.clone()) }, &mut out);
+            session.receive(&TimedArrival { at, arrival: Arrival::Bytes(bytes.clone()) }, &mut out);
         }
         let is_named = |output: &Output| matches!(output, Output::Event(event) if matches!(&event.event, Event::Trouble { text } if text.contains("repeats readings")));
         named += out.drain(..).filter(is_named).count();
@@ -100,7 +100,7 @@ fn a_board_that_repeats_its_readings_is_named_once_and_its_noise_learnt_from_eac
 
 /// A board with a fast clock, and frames that arrive up to 5 ms late: the times are those of the host.
 #[test]
-fn binary_frames_keep_the_hosts_time_whatever_the_boards_clock_does() {
+fn binary_frames_keep_host_time_with_any_board_clock() {
     let rig = Rig::from_toml(RIG).unwrap();
     let locator = locator(&rig);
     let frames = FrameForm::Binary { clock_ppm: 300.0 };
@@ -114,7 +114,7 @@ fn binary_frames_keep_the_hosts_time_whatever_the_boards_clock_does() {
         let bytes = board.send_until(taken);
         let elapsed = taken + Duration::from_micros(frame * 7919 % 5000);
         let at = Stamp { elapsed, unix_ns: start_ns + elapsed.as_nanos() as u64 };
-        session.receive(&Arrived { at, arrival: Arrival::Bytes(bytes) }, &mut out);
+        session.receive(&TimedArrival { at, arrival: Arrival::Bytes(bytes) }, &mut out);
         for output in out.drain(..) {
             let Output::Sample(sample) = output else { continue };
             let off_s = (sample.unix_ns as f64 - (start_ns + taken.as_nanos() as u64) as f64) * 1e-9;
@@ -144,7 +144,7 @@ impl<'a> Bench<'a> {
     }
 
     fn finger(&mut self, line: &str) {
-        self.board.finger_mut().obey(line).unwrap();
+        self.board.finger_mut().execute(line).unwrap();
     }
 
     /// Leaves the surface untouched at first, so the baseline is known before the first contact.
@@ -162,7 +162,7 @@ impl<'a> Bench<'a> {
             let arrival = Arrival::Bytes(self.board.send_until(elapsed));
             let elapsed = elapsed + self.silent;
             let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
-            self.session.receive(&Arrived { at, arrival }, &mut out);
+            self.session.receive(&TimedArrival { at, arrival }, &mut out);
         }
         let (mut samples, mut events) = (Vec::new(), Vec::new());
         for output in out {
@@ -287,7 +287,7 @@ fn a_tracker_is_carried_over_gaps_and_immense_readings() {
     let elapsed = bench.board.next_at() + bench.silent;
     let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
     let mut out = Vec::new();
-    bench.session.receive(&Arrived { at, arrival: Arrival::Bytes(line) }, &mut out);
+    bench.session.receive(&TimedArrival { at, arrival: Arrival::Bytes(line) }, &mut out);
     for output in &out {
         let Output::Sample(sample) = output else { continue };
         assert!(sample.estimate.is_in_numbers() && sample.estimate.status != Status::Located, "{sample:?}");
@@ -360,7 +360,7 @@ impl FeedBench<'_> {
     fn report_after(&mut self, ms: u64, arrival: Arrival) -> Option<String> {
         let elapsed = Duration::from_millis(ms);
         let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
-        let arrived = Arrived { at, arrival };
+        let arrived = TimedArrival { at, arrival };
         self.session.receive(&arrived, &mut Vec::new());
         self.feed.receive(&arrived.arrival, elapsed, self.session.frames());
         self.feed.report(elapsed, self.session.frames())

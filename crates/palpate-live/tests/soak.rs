@@ -4,7 +4,7 @@
 
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::imperfections::{Amount, Imperfections, OffsetDrift, Relaxation};
-use palpate_live::input::{Arrival, Arrived};
+use palpate_live::input::{Arrival, TimedArrival};
 use palpate_live::recording::RecordingSwitch;
 use palpate_live::session::{Estimation, Session, SessionConfig};
 use palpate_live::simulated_board::{BoardConfig, FaultConfig, Finger, SimulatedBoard};
@@ -69,7 +69,8 @@ fn soak(minutes: f64) {
         let frame = board.next_frame();
         let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
         let mut outputs = Vec::new();
-        let mut receive = |arrival, outputs: &mut Vec<_>| session.receive(&Arrived { at, arrival }, outputs);
+        let mut receive =
+            |arrival, outputs: &mut Vec<_>| session.receive(&TimedArrival { at, arrival }, outputs);
         match (was_away, is_away) {
             (false, true) => {
                 pulls += 1;

@@ -4,10 +4,10 @@ use palpate_estimators::evaluation::{Evaluation, limit_ratio};
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::recording::{Recording, Row};
 use palpate_estimators::simulate::SimulatedBench;
-use palpate_live::calibration::{Guide, Press, Progress, Waiting};
+use palpate_live::calibration::{AwaitedStep, Guide, Press, Progress};
 use palpate_live::stage::{
-    Doubt, FaultKind, Finger, Firmware, GcodeStage, Greeting, MachineConfig, MachineFault, SimulatedLink,
-    SimulatedMachine, StageError, StageLink, Stopping,
+    FaultKind, Finger, Firmware, GcodeStage, Greeting, MachineConfig, MachineFault, SimulatedLink,
+    SimulatedMachine, StageError, StageLink, StopReason, Stopping,
 };
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::units::mm;
@@ -100,7 +100,7 @@ fn slow_and_quiet_machines_stay_in_step() {
             let machine = machine(firmware, config.clone());
             let outcome = press_three_places(&machine);
             assert!(outcome.is_ok(), "{firmware:?} {config:?}: {outcome:?}");
-            assert_eq!(machine.doubtful_moves(), 0, "{firmware:?} {config:?}");
+            assert_eq!(machine.unsafe_moves(), 0, "{firmware:?} {config:?}");
         }
     }
 }
@@ -116,7 +116,7 @@ fn lines_of(firmware: Firmware) -> [(&'static str, u32); 6] {
 
 /// Every fault, at every kind of line, of either firmware: only a lift follows, the machine is halted, and the finger is up if the message states it.
 #[test]
-fn any_fault_stops_the_machine_with_its_finger_up_or_says_why_not() {
+fn any_fault_stops_the_machine_and_lifts_or_reports() {
     use FaultKind::*;
     let kinds = [Unknown, Lost, Silence, Resend, HomeFirst, Error, Reset, ResetMoving, Endstop, ExtraOk];
     for firmware in FIRMWARES {
@@ -143,8 +143,10 @@ fn any_fault_stops_the_machine_with_its_finger_up_or_says_why_not() {
 fn stops_for_a_fault(machine: &SimulatedMachine, kind: FaultKind, name: &str) {
     let outcome = press_three_places(machine);
     assert_eq!(machine.faults_met(), 1, "{name}: {outcome:?}");
-    let Err(StageError::Doubt { doubt, finger }) = outcome else { panic!("{name}: {outcome:?}") };
-    assert_eq!(machine.doubtful_moves(), 0, "{name}: {doubt}");
+    let Err(StageError::Unexpected { reason: doubt, finger }) = outcome else {
+        panic!("{name}: {outcome:?}")
+    };
+    assert_eq!(machine.unsafe_moves(), 0, "{name}: {doubt}");
     // A Marlin that halts by itself reads no stop any more.
     assert!(machine.is_stopped() || kind == FaultKind::Error, "{name}: {doubt}");
     match finger {
@@ -164,7 +166,7 @@ fn stops_for_a_fault(machine: &SimulatedMachine, kind: FaultKind, name: &str) {
         ),
         Finger::Unmoved => panic!("{name}: it has moved"),
     }
-    let words = StageError::Doubt { doubt, finger }.to_string();
+    let words = StageError::Unexpected { reason: doubt, finger }.to_string();
     let quote = match (kind, name.starts_with("Marlin")) {
         (FaultKind::Unknown, true) => "echo:Unknown command",
         (FaultKind::Unknown, false) => "error:20",
@@ -193,11 +195,14 @@ fn reset_at_rest_is_seen_before_the_next_move() {
         machine.open();
         let error = stage.watch().unwrap_err();
         assert!(
-            matches!(error, StageError::Doubt { doubt: Doubt::Restart { .. }, finger: Finger::Unknown }),
+            matches!(
+                error,
+                StageError::Unexpected { reason: StopReason::Restart { .. }, finger: Finger::Unknown }
+            ),
             "{error}"
         );
         assert!(matches!(stage.lift(), Err(StageError::Stopped)));
-        assert_eq!(machine.doubtful_moves(), 0);
+        assert_eq!(machine.unsafe_moves(), 0);
         assert!(machine.is_stopped());
     }
 }
@@ -369,9 +374,11 @@ fn any_fault_of_a_jog_or_a_touch_off_stops_the_machine() {
                     .and_then(|()| stage.lower(touch_m - mm(1.0)))
                     .and_then(|()| stage.lift());
                 assert_eq!(machine.faults_met(), 1, "{name}");
-                let Err(StageError::Doubt { finger, .. }) = outcome else { panic!("{name}: {outcome:?}") };
+                let Err(StageError::Unexpected { finger, .. }) = outcome else {
+                    panic!("{name}: {outcome:?}")
+                };
                 assert!(machine.is_stopped() || kind == Error, "{name}");
-                assert_eq!(machine.doubtful_moves(), 0, "{name}");
+                assert_eq!(machine.unsafe_moves(), 0, "{name}");
                 assert!(finger == Finger::Unknown || machine.contact().is_none(), "{name}: {finger:?}");
                 assert!(matches!(stage.jog([mm(1.0), 0.0, 0.0]), Err(StageError::Stopped)), "{name}");
             }
@@ -380,7 +387,7 @@ fn any_fault_of_a_jog_or_a_touch_off_stops_the_machine() {
 }
 
 #[test]
-fn stop_reaches_the_machine_and_nothing_moves_after_it() {
+fn machine_does_not_move_after_a_stop() {
     for firmware in FIRMWARES {
         let machine = machine(firmware, MachineConfig::default());
         let stop = Arc::new(AtomicBool::new(false));
@@ -443,13 +450,13 @@ fn a_machine_calibrates_by_itself_to_the_limit() {
             Progress::Waits(_) | Progress::None => {}
             other => panic!("{other:?}"),
         }
-        match (guide.waiting(), guide.next_press()) {
-            (Waiting::Press, Some((_, press))) => {
+        match (guide.awaited_step(), guide.next_press()) {
+            (AwaitedStep::Press, Some((_, press))) => {
                 stage.travel(press.position).unwrap();
                 stage.press(DEPTH_M).unwrap();
             }
-            (Waiting::Release, _) => stage.lift().unwrap(),
-            (Waiting::Nothing, _) => break,
+            (AwaitedStep::Release, _) => stage.lift().unwrap(),
+            (AwaitedStep::Nothing, _) => break,
             _ => {}
         }
     }
@@ -457,7 +464,7 @@ fn a_machine_calibrates_by_itself_to_the_limit() {
     assert_eq!(recording.touched().rows.len(), positions.len() * training.repeats);
     let locator = rig.estimator.fit_task(FitTask::new(&rig.setup, &recording)).unwrap();
     let trial = rig.trials(1, 77).unwrap().remove(0);
-    let evaluation = Evaluation::new(&locator, &trial.judged).unwrap();
+    let evaluation = Evaluation::new(&locator, &trial.held_out).unwrap();
     let ratio = limit_ratio(&rig.setup, &evaluation).unwrap();
     assert!((0.8..1.2).contains(&ratio), "{ratio} × the limit");
 }

@@ -10,13 +10,13 @@ use palpate_numerics::OutOfRange;
 /// A position off the surface.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "{what} {number} is at {}, off the surface; it must be within {}",
+    "{object} {number} is at {}, off the surface; it must be within {}",
     extent.place_in_words(*position),
     extent.bounds_in_words()
 )]
 pub struct OffSurface {
     /// Name of the object.
-    pub what: &'static str,
+    pub object: &'static str,
     /// Number in its list.
     pub number: usize,
     /// The position.
@@ -32,7 +32,7 @@ impl OffSurface {
     /// [`OffSurface`] for the first that is off.
     pub fn check(what: &'static str, positions: &[Position], extent: Extent) -> Result<(), Self> {
         match positions.iter().position(|position| !extent.contains(*position)) {
-            Some(i) => Err(Self { what, number: i + 1, position: positions[i], extent }),
+            Some(i) => Err(Self { object: what, number: i + 1, position: positions[i], extent }),
             None => Ok(()),
         }
     }
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn a_grid_is_told_by_its_columns_and_rows() {
+    fn grid_is_described_by_columns_and_rows() {
         let at = |i: usize| Position { x_m: 0.01 * (i % 3) as f64, y_m: 0.1 * (i / 3) as f64 };
         let mut positions: Vec<Position> = (0..6).map(at).collect();
         assert_eq!(PLANE.places_in_words(&positions), "x 0, 10, 20 with y 0, 100 mm each");

@@ -187,9 +187,9 @@ impl Layout {
     }
 
     /// Disables or enables a sensor, by index.
-    pub fn set_dead(&mut self, sensor: usize, dead: bool) {
+    pub fn set_disabled(&mut self, sensor: usize, dead: bool) {
         if let Some(sensor) = self.sensors.get_mut(sensor) {
-            sensor.channel.dead = dead;
+            sensor.channel.disabled = dead;
         }
     }
 
@@ -229,7 +229,7 @@ impl Layout {
     /// [`NoiseError`] for singular noise, or no active sensor.
     pub fn reading_sds(&self) -> Result<Vec<Option<f64>>, NoiseError> {
         let sds = self.sensors.iter().enumerate().map(|(i, sensor)| {
-            let ChannelModel { noise_sd, resolution, dead, .. } = sensor.channel;
+            let ChannelModel { noise_sd, resolution, disabled: dead, .. } = sensor.channel;
             let sd = sensor.channel.reading_sd();
             if dead {
                 Ok(None)
@@ -347,7 +347,8 @@ pub struct ChannelModel {
     /// Saturation limits.
     pub range: Option<(f64, f64)>,
     /// True for a disabled channel.
-    pub dead: bool,
+    #[serde(rename = "dead")]
+    pub disabled: bool,
 }
 
 /// Errors of one simulated bench.
@@ -433,7 +434,7 @@ impl ChannelModel {
     }
 
     fn report(&self, value: f64) -> f64 {
-        if self.dead {
+        if self.disabled {
             return 0.0;
         }
         let quantised =

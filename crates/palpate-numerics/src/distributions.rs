@@ -22,7 +22,7 @@ pub fn hull(one: (f64, f64), other: (f64, f64)) -> (f64, f64) {
 
 /// Smallest interval around an interval and a value.
 #[inline]
-pub fn holding(interval: (f64, f64), value: f64) -> (f64, f64) {
+pub fn extend_to(interval: (f64, f64), value: f64) -> (f64, f64) {
     hull(interval, (value, value))
 }
 

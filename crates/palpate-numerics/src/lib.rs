@@ -31,7 +31,7 @@ pub mod watch;
 pub use cholesky::{Cholesky, NotPositiveDefinite};
 pub use distributions::{
     ELLIPSE_95, NORMAL_95, NORMAL_99, NormalPart, binomial_tail, bisect, chi_squared_critical_value,
-    chi_squared_survival, clamped_interval, holding, hull, normal_between, normal_cdf, normal_interval_95,
+    chi_squared_survival, clamped_interval, extend_to, hull, normal_between, normal_cdf, normal_interval_95,
     normal_quantile, student_critical_value, student_ln_density, student_survival,
 };
 pub use eigen::symmetric_eigen;

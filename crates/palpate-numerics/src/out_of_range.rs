@@ -9,10 +9,10 @@
 /// assert_eq!(refused.to_string(), "the width is -0.04; it must be greater than 0 and finite");
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("{what} is {value}; it must be {bound}")]
+#[error("{quantity} is {value}; it must be {bound}")]
 pub struct OutOfRange {
     /// Name of the number.
-    pub what: &'static str,
+    pub quantity: &'static str,
     /// Value.
     pub value: f64,
     /// Bound.
@@ -46,6 +46,6 @@ impl OutOfRange {
         good: impl Fn(f64) -> bool,
     ) -> Result<(), Self> {
         let wrong = numbers.into_iter().find(|(_, value)| !good(*value));
-        wrong.map_or(Ok(()), |(what, value)| Err(Self { what, value, bound }))
+        wrong.map_or(Ok(()), |(what, value)| Err(Self { quantity: what, value, bound }))
     }
 }

@@ -296,7 +296,7 @@ mod tests {
         }
 
         #[test]
-        fn what_is_held_is_left_out(a in positive_definite()) {
+        fn constrained_unknowns_are_excluded(a in positive_definite()) {
             let factors = Ldl::of_free(&a, [true, false, true, false]).unwrap();
             let smaller = Ldl::new(&[[a[0][0], a[0][2]], [a[2][0], a[2][2]]]).unwrap();
             let [x, y] = smaller.solve([1.0, -2.0]);

@@ -287,7 +287,7 @@ impl Supernode {
     }
 
     /// Merges the next column, unless too many zeros result.
-    fn take_in(&mut self, rows: &[usize]) -> bool {
+    fn merge_next_column(&mut self, rows: &[usize]) -> bool {
         let width = self.columns.len();
         let zeros = self.zeros + width * rows.len();
         let most = if width < SMALL { MOST_ZEROS } else { FEW_ZEROS };
@@ -335,7 +335,7 @@ fn supernodes(matrix: &SparseSymmetric, watch: Watch) -> Result<Vec<Supernode>, 
         };
         let taken = before.filter(|before| {
             let lacking = new_of(&rows, *before, &mut owner);
-            supernodes[*before].take_in(&lacking)
+            supernodes[*before].merge_next_column(&lacking)
         });
         let index = taken.unwrap_or_else(|| {
             rows.push(column);
@@ -460,7 +460,7 @@ mod tests {
     }
 
     #[test]
-    fn it_stops_at_whichever_look_says_so() {
+    fn factoring_stops_at_any_check() {
         let (matrix, _) = matrices(&[0.5; 150], 7);
         let factor = SparseCholesky::new(&matrix).unwrap();
         let looks = AtomicUsize::new(0);

@@ -4,7 +4,7 @@ use super::drawing::axis::plain;
 use super::drawing::geometry::{Point, Rect};
 use super::drawing::svg::{Anchor, Colour, GRID, INK, Label, QUIET_INK, REFERENCE, Svg, palette};
 use super::drawing::text;
-use super::numbers::stated;
+use super::numbers::rig_number;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::{Beam, BeamSection, BeamSupportKind, SupportedBeam, Surface};
@@ -91,7 +91,7 @@ impl BeamDrawing {
             steps: Vec::new(),
             sensors_mm: layout.sensors().iter().map(|sensor| sensor.position.x_m * 1e3).collect(),
             load_mm: load.x_m * 1e3,
-            load_label: format!("{} N", stated(force_n)),
+            load_label: format!("{} N", rig_number(force_n)),
             deflection_mm: (0..=SHAPE_STEPS).map(point).collect(),
             width_px: 760,
         }
@@ -143,12 +143,12 @@ impl Frame {
         frame
     }
 
-    fn across(&self, position_mm: f64) -> f64 {
+    fn x_px(&self, position_mm: f64) -> f64 {
         MARGIN + position_mm.clamp(0.0, self.length_mm) * self.px_per_mm
     }
 
     fn deflected(&self, position_mm: f64, deflection_mm: f64) -> Point {
-        (self.across(position_mm), BEAM_Y - deflection_mm * self.px_per_mm * self.exaggeration)
+        (self.x_px(position_mm), BEAM_Y - deflection_mm * self.px_per_mm * self.exaggeration)
     }
 
     fn surface_y(&self, across: f64) -> f64 {
@@ -176,7 +176,7 @@ fn number_labels(drawing: &BeamDrawing, frame: &Frame) -> (Vec<Label>, usize) {
     let mut rows = text::Rows::default();
     let label = |(index, &position_mm): (usize, &f64)| {
         let number = (index + 1).to_string();
-        let middle = frame.across(position_mm);
+        let middle = frame.x_px(position_mm);
         let half = text::width(&number, NUMBER_SIZE) / 2.0 + 2.0;
         let row = rows.place(middle - half, middle + half);
         let y = NUMBER_TOP + (row as f64 + 0.5) * NUMBER_LINE;
@@ -189,7 +189,7 @@ fn number_labels(drawing: &BeamDrawing, frame: &Frame) -> (Vec<Label>, usize) {
 fn draw_sensors(svg: &mut Svg, drawing: &BeamDrawing, frame: &Frame) {
     let colour = palette(2);
     for &position_mm in &drawing.sensors_mm {
-        let across = frame.across(position_mm);
+        let across = frame.x_px(position_mm);
         svg.line(&[(across, frame.surface_y(across)), (across, PROBE_TOP)], 1.2, colour);
         let (left, right) = (across - PROBE_HALF_WIDTH, across + PROBE_HALF_WIDTH);
         svg.rectangle(Rect { left, right, top: PROBE_TOP, bottom: PROBE_TOP + PROBE_HEIGHT }, colour);
@@ -209,7 +209,7 @@ fn draw_beam(svg: &mut Svg, drawing: &BeamDrawing, frame: &Frame) {
     let mut left = MARGIN;
     let ends_mm = drawing.steps.iter().map(|step| step.0);
     for to_mm in ends_mm.chain(drawing.steps.is_empty().then_some(drawing.length_mm)) {
-        let (right, half) = (frame.across(to_mm), half_thickness(drawing, to_mm));
+        let (right, half) = (frame.x_px(to_mm), half_thickness(drawing, to_mm));
         svg.rectangle(Rect { left, right, top: BEAM_Y - half, bottom: BEAM_Y + half }, GRID);
         left = right;
     }
@@ -221,7 +221,7 @@ fn draw_support(
     (position_mm, kind): (f64, BeamSupportKind),
     frame: &Frame,
 ) {
-    let across = frame.across(position_mm);
+    let across = frame.x_px(position_mm);
     match kind {
         BeamSupportKind::Simple => {
             let top = BEAM_Y + half_thickness(drawing, position_mm);
@@ -287,7 +287,7 @@ fn draw_deflection(svg: &mut Svg, drawing: &BeamDrawing, frame: &Frame) {
 
 fn draw_load(svg: &mut Svg, drawing: &BeamDrawing, frame: &Frame) {
     let colour = palette(1);
-    let across = frame.across(drawing.load_mm);
+    let across = frame.x_px(drawing.load_mm);
     let tip = (across, frame.surface_y(across).min(BEAM_Y) - BEAM_HALF_THICKNESS);
     svg.line(&[(across, ARROW_TAIL_Y.min(tip.1 - 10.0)), (across, tip.1 - 8.0)], 2.2, colour);
     arrow_head(svg, tip, (0.0, 1.0), 10.0, colour);

@@ -4,7 +4,7 @@ use maud::html;
 
 use super::beam_drawing::{beam_drawing, supported_beam_drawing};
 use super::digit_figures::shapes_figure;
-use super::numbers::{counted, mm, stated};
+use super::numbers::{counted, mm, rig_number};
 use super::page::Figure;
 use super::{Axis, Chart, Mark, Marker, Series};
 use palpate_mechanics::sensing::{Layout, SensorKind};
@@ -29,7 +29,7 @@ pub(super) fn bench_figure(
         SurfaceSpec::Plate(_) | SurfaceSpec::Measured(_) => return None,
     };
     let caption = html! {
-        (what) ": a beam" (held) " and " (counted(layout.len(), "sensor", "sensors")) ", with " (stated(force_n)) " N at "
+        (what) ": a beam" (held) " and " (counted(layout.len(), "sensor", "sensors")) ", with " (rig_number(force_n)) " N at "
         (mm(load.x_m)) " mm. Blue: the bent beam, " (solution) "."
     };
     Some(Figure::beam(format!("{what}: beam, supports, sensors and load"), &drawing, caption))

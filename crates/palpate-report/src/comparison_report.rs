@@ -29,7 +29,7 @@ pub struct ComparisonReport<'a> {
     /// Estimators, best first.
     pub comparisons: &'a [Comparison],
     /// Unsuitable kinds of estimators, with the reasons.
-    pub left_out: &'a [(&'static str, String)],
+    pub omitted: &'a [(&'static str, String)],
     /// Largest error in metres that counts for the effective length.
     pub tolerance_m: f64,
     /// Seed of simulation and fits.
@@ -46,7 +46,7 @@ pub fn comparison_report(report: &ComparisonReport) -> Vec<ReportFile> {
         Section::new("table", "The estimators")
             .table(report.errors_table())
             .table(report.intervals_table())
-            .text(report.left_out_in_words()),
+            .text(report.omitted_estimators_text()),
         Section::new("along", heading).figure(errors),
         Section::new("share", "How many readings are how good").figure(report.share_figure()),
     ];
@@ -60,7 +60,7 @@ impl ComparisonReport<'_> {
 
     fn summary(&self) -> Markup {
         let best = self.comparisons.first();
-        let mean = best.and_then(|best| best.tried.evaluation.summary(None));
+        let mean = best.and_then(|best| best.timed.evaluation.summary(None));
         html! {
             li { (counted(self.comparisons.len(), "estimator", "estimators")) " on " (self.trials) "." }
             @if let (Some(best), Some(mean)) = (best, mean) {
@@ -68,16 +68,16 @@ impl ComparisonReport<'_> {
                     "The least mean error is that of " b { (best.estimator.name()) } ": "
                     (number(mean.average_m * 1e3)) " mm, median " (number(mean.median_m * 1e3)) " mm."
                 }
-                @if let Some(ratio) = limit_ratio(self.setup, &best.tried.evaluation) {
+                @if let Some(ratio) = limit_ratio(self.setup, &best.timed.evaluation) {
                     li { "That is " (number(ratio)) " times what physics allows where the limit is small." }
                 }
             }
         }
     }
 
-    fn tried(&self) -> impl Iterator<Item = (&Comparison, &Evaluation, ErrorSummary)> {
+    fn successful(&self) -> impl Iterator<Item = (&Comparison, &Evaluation, ErrorSummary)> {
         self.comparisons.iter().filter_map(|comparison| {
-            let evaluation = &comparison.tried.evaluation;
+            let evaluation = &comparison.timed.evaluation;
             Some((comparison, evaluation, evaluation.summary(None)?))
         })
     }
@@ -92,7 +92,7 @@ impl ComparisonReport<'_> {
             (number(self.tolerance_m * 1e3)) " mm. × limit: mean error over what physics allows, where the limit is at most " (small)
             " of the length, 1/80 of it away from the ends. A dash: the bench has no limit."
         };
-        Table::from_rows(self.tried())
+        Table::from_rows(self.successful())
             .short("estimator", |(comparison, ..)| comparison.estimator.name())
             .mm("mean", |(.., summary)| summary.average_m)
             .number("% of length", |(_, of, summary)| {
@@ -103,8 +103,8 @@ impl ComparisonReport<'_> {
             .mm("RMS", |(.., summary)| summary.rmse_m)
             .number("effective, %", |(_, evaluation, _)| evaluation.effective_percent(self.tolerance_m))
             .number("× limit", |(_, evaluation, _)| limit_ratio(self.setup, evaluation))
-            .number("fit, ms", |(comparison, ..)| comparison.tried.fit_seconds * 1e3)
-            .number("a reading, µs", |(comparison, ..)| comparison.tried.locate_ns * 1e-3)
+            .number("fit, ms", |(comparison, ..)| comparison.timed.fit_seconds * 1e3)
+            .number("a reading, µs", |(comparison, ..)| comparison.timed.locate_ns * 1e-3)
             .caption(caption)
     }
 
@@ -120,7 +120,7 @@ impl ComparisonReport<'_> {
                 .find(|(of, _)| *of == status)
                 .map(|(_, percent)| percent)
         };
-        Table::from_rows(self.tried())
+        Table::from_rows(self.successful())
             .short("estimator", |(comparison, ..)| comparison.estimator.name())
             .number("covered, %", |(_, evaluation, _)| evaluation.coverage_percent())
             .mm("score, mm", |(_, evaluation, _)| evaluation.interval_score_m())
@@ -131,12 +131,12 @@ impl ComparisonReport<'_> {
             .caption(caption)
     }
 
-    fn left_out_in_words(&self) -> Markup {
+    fn omitted_estimators_text(&self) -> Markup {
         html! {
-            @if !self.left_out.is_empty() {
+            @if !self.omitted.is_empty() {
                 p { "Left out:" }
                 ul {
-                    @for (kind, why) in self.left_out {
+                    @for (kind, why) in self.omitted {
                         li { b { (*kind) } ": " (why) "." }
                     }
                 }
@@ -148,7 +148,7 @@ impl ComparisonReport<'_> {
         // The seventh colour, black, is that of the limit.
         const COLOURS: usize = 6;
         let series = |(i, comparison): (usize, &Comparison)| {
-            let (label, points) = (comparison.estimator.name(), points(&comparison.tried.evaluation));
+            let (label, points) = (comparison.estimator.name(), points(&comparison.timed.evaluation));
             let drawn = if i < COLOURS { Series::line } else { Series::dashes };
             drawn(label, i % COLOURS, points)
         };
@@ -158,7 +158,7 @@ impl ComparisonReport<'_> {
     fn errors_map(&self) -> Figure {
         let shown = self.comparisons.iter().take(MOST_MAPS);
         let evaluations: Vec<(&str, &Evaluation)> =
-            shown.map(|comparison| (comparison.estimator.name(), &comparison.tried.evaluation)).collect();
+            shown.map(|comparison| (comparison.estimator.name(), &comparison.timed.evaluation)).collect();
         let what = "Median error of each estimator, from the best mean to the worst and all on one scale";
         error_map(self.setup, "Median error over the surface", what, &evaluations)
     }

@@ -20,7 +20,7 @@ pub fn dead_areas_report(study: &DeadAreas, findings: &DeadAreaResults) -> Vec<R
         Section::new("how", "How it was done").text(report.how()),
     ];
     Page::new("Dead areas between sensors", report.summary(), sections)
-        .with_lead(report.lead())
+        .with_lead(report.introduction())
         .with_source(html! { ", seed " (study.seed) })
         .files()
 }
@@ -47,7 +47,7 @@ impl DeadAreasReport<'_> {
         rows.find(|row| row.sensing == sensing && row.estimator == estimator && row.sensors == sensors)
     }
 
-    fn lead(&self) -> Markup {
+    fn introduction(&self) -> Markup {
         let counts: Vec<String> = self.study.counts.iter().map(usize::to_string).collect();
         let tolerance = mm(self.study.tolerance_m);
         html! { p { "Effective length (errors within " (tolerance) " mm) over " (counts.join(", ")) " sensors:" } }
@@ -135,7 +135,7 @@ impl DeadAreasReport<'_> {
                  full scale, and its centroid is calibrated by the same presses. Networks trained by back-propagation stop after two \
                  million presentations."
             }
-            @for (sensing, estimator, sensors, why) in &self.findings.left_out {
+            @for (sensing, estimator, sensors, why) in &self.findings.omitted {
                 p { (sensing) ", " (estimator) ", " (sensors) " sensors: left out, as " (why) "." }
             }
         }

@@ -6,11 +6,11 @@ use super::bench_figures::{bench_figure, sites_chart};
 use super::drawing::chart::Extremes;
 use super::error_lines::in_milli;
 use super::maps::{self, compared_maps, limits_mm, sensors_mm};
-use super::numbers::{NOTHING, counted, mm, number, quantity, stated};
+use super::numbers::{NOTHING, counted, mm, number, quantity, rig_number};
 use super::page::{Figure, Page, ReportFile, Section, Table};
 use super::{Axis, Chart, Mark, Marker, Series};
 use palpate_design::sensors::{
-    Assessment, CountPoint, DesignCriterion, Designed, KeepOut, Method, SensorProblem, Symmetry,
+    AssessedLayout, Assessment, CountPoint, DesignCriterion, KeepOut, Method, SensorProblem, Symmetry,
     Verification, best_design, enough,
 };
 use palpate_estimators::estimator::Cells;
@@ -32,7 +32,7 @@ pub struct SensorDesignReport<'a> {
     /// Design problem.
     pub problem: &'a SensorProblem<'a>,
     /// Designed layouts.
-    pub designed: &'a [Designed],
+    pub designed: &'a [AssessedLayout],
     /// Errors of simulated calibrations, for some of the layouts.
     pub verified: &'a [(Method, Verification)],
     /// Layouts with other numbers of sensors; may be empty.
@@ -66,11 +66,11 @@ pub fn sensor_design_report(report: &SensorDesignReport) -> Vec<ReportFile> {
 
 impl<'a> SensorDesignReport<'a> {
     /// Even layout, or the present one if its sensors are kept.
-    fn even(&self) -> Option<&'a Designed> {
+    fn even(&self) -> Option<&'a AssessedLayout> {
         self.problem.reference(self.designed)
     }
 
-    fn best(&self) -> Option<&'a Designed> {
+    fn best(&self) -> Option<&'a AssessedLayout> {
         best_design(self.designed)
     }
 
@@ -84,8 +84,9 @@ impl<'a> SensorDesignReport<'a> {
 
     fn summary(&self) -> Markup {
         let Some(best) = self.best() else { return html! {} };
-        let limit = |designed: &Designed| designed.assessment.mean_limit_m.map_or(f64::NAN, |m| m * 1e3);
-        let error = |designed: &Designed| {
+        let limit =
+            |designed: &AssessedLayout| designed.assessment.mean_limit_m.map_or(f64::NAN, |m| m * 1e3);
+        let error = |designed: &AssessedLayout| {
             self.verification(designed.method).map(|verified| verified.mean_error_m * 1e3)
         };
         let even = self.even();
@@ -121,7 +122,8 @@ impl<'a> SensorDesignReport<'a> {
 
     fn table(&self) -> Table {
         let scale = self.problem.design().criterion.score_scale();
-        let (design, assessed) = (self.problem.design(), |designed: &&'a Designed| &designed.assessment);
+        let (design, assessed) =
+            (self.problem.design(), |designed: &&'a AssessedLayout| &designed.assessment);
         let broken = self.designed.iter().any(|designed| !designed.assessment.keeps_constraints);
         let caption = html! {
             "The layouts. Score: " (score_in_words(design.criterion)) ", the smaller the better. One dead: the worst score when \
@@ -154,7 +156,7 @@ impl<'a> SensorDesignReport<'a> {
                 }
             });
         if design.has_costs() {
-            table = table.numeric("cost", |designed| stated(assessed(designed).cost));
+            table = table.numeric("cost", |designed| rig_number(assessed(designed).cost));
         }
         table.caption(caption)
     }
@@ -167,16 +169,16 @@ impl<'a> SensorDesignReport<'a> {
     }
 
     fn sites_figure(&self) -> Figure {
-        let row = |designed: &'a Designed| (designed.method.name().to_owned(), &designed.layout);
+        let row = |designed: &'a AssessedLayout| (designed.method.name().to_owned(), &designed.layout);
         let rows: Vec<_> = self.designed.iter().map(row).collect();
-        let chart = sites_chart(&rows, self.length_mm() * 1e-3, self.kept_out());
+        let chart = sites_chart(&rows, self.length_mm() * 1e-3, self.keep_out_marks());
         Figure::chart(&chart, html! { "The sensors of every layout, a row each." })
     }
 
     fn limit_figure(&self) -> Option<Figure> {
         let (even, best) = (self.even(), self.best()?);
-        let name = |designed: &Designed| format!("limit, {} layout", designed.method.name());
-        let limits = |designed: &Designed| {
+        let name = |designed: &AssessedLayout| format!("limit, {} layout", designed.method.name());
+        let limits = |designed: &AssessedLayout| {
             let curve = self.limit_of(designed)?;
             Some(in_milli(curve.by_x(|bound| bound.sd_position_m)))
         };
@@ -191,7 +193,7 @@ impl<'a> SensorDesignReport<'a> {
         } else {
             (0.0, 1.1 * greatest, [0.1 * greatest, 0.04 * greatest])
         };
-        let sites = |designed: &Designed, colour, y, marker| {
+        let sites = |designed: &AssessedLayout, colour, y, marker| {
             let points = designed.layout.sensors().iter().map(|sensor| (sensor.position.x_m * 1e3, y));
             let label = format!("sensors, {} layout", designed.method.name());
             Series::markers(label, colour, points.collect(), marker)
@@ -201,17 +203,17 @@ impl<'a> SensorDesignReport<'a> {
         let x = Axis::linear("contact position, mm").from_to(0.0, self.length_mm());
         let y = extremes.axis("limit, mm").from_to(from, to);
         let chart = Chart::new("The least standard deviation of a located contact", x, y, series)
-            .with_marks(self.kept_out())
+            .with_marks(self.keep_out_marks())
             .with_height(500);
         let caption = html! {
-            "The limit at the contacts of the design, for " (stated(self.problem.force_n())) " N, force "
+            "The limit at the contacts of the design, for " (rig_number(self.problem.force_n())) " N, force "
             (self.problem.force().name()) ", with the sensors of either layout beneath."
             @if !self.problem.design().keep_out.is_empty() { " Shaded: where no sensor may sit." }
         };
         Some(Figure::chart(&chart, caption))
     }
 
-    fn limit_of(&self, designed: &Designed) -> Option<LimitCurve> {
+    fn limit_of(&self, designed: &AssessedLayout) -> Option<LimitCurve> {
         let setup = self.setup.clone().with_layout(designed.layout.clone()).ok()?;
         let positions = &self.problem.contacts().positions;
         let limit = setup.cramer_rao_bound().ok()?;
@@ -221,25 +223,25 @@ impl<'a> SensorDesignReport<'a> {
     fn limit_maps(&self) -> Vec<Figure> {
         let cells = Cells::nearly_square(self.setup.surface().extent(), CELLS, CELLS_A_SIDE);
         let force = (self.problem.force_n(), self.problem.force());
-        let limits = |designed: &'a Designed| {
+        let limits = |designed: &'a AssessedLayout| {
             let setup = self.setup.clone().with_layout(designed.layout.clone()).ok()?;
             let values =
                 limits_mm(&setup.cramer_rao_bound().ok()?, &cells, force, |bound| bound.sd_position_m);
             let dots_mm = sensors_mm(&designed.layout);
-            Some(maps::Designed { name: designed.method.name(), values, dots_mm })
+            Some(maps::DesignMap { name: designed.method.name(), values, dots_mm })
         };
         let designs = self.best().into_iter().chain(self.even()).filter_map(limits).collect();
         let title = |name: &str| format!("The least standard deviation of a located contact, {name} layout");
         let caption = |name: &str, most: &str| {
             html! {
-                "The limit at each contact position with the " (name) " layout, for " (stated(force.0)) " N, force "
+                "The limit at each contact position with the " (name) " layout, for " (rig_number(force.0)) " N, force "
                 (force.1.name()) ". Dots: the sensors. Limits above " (most) " mm have its colour."
             }
         };
         compared_maps(cells, "limit, mm", designs, title, caption)
     }
 
-    fn kept_out(&self) -> Vec<Mark> {
+    fn keep_out_marks(&self) -> Vec<Mark> {
         let mark = |zone: &KeepOut| Mark::Span {
             low: zone.from.x_m * 1e3,
             high: zone.to.x_m * 1e3,
@@ -306,23 +308,23 @@ impl<'a> SensorDesignReport<'a> {
                     words += &format!(", resolution {}", in_unit(channel.resolution));
                 }
                 if design.has_costs() {
-                    words += &format!(", cost {}", stated(offer.cost));
+                    words += &format!(", cost {}", rig_number(offer.cost));
                 }
                 words
             })
             .collect();
         html! {
             ul {
-                @if !design.kept.is_empty() {
+                @if !design.fixed.is_empty() {
                     li {
-                        (counted(design.kept.len(), "sensor is", "sensors are")) " kept; "
-                        (counted(design.count - design.kept.len(), "is", "are")) " new."
+                        (counted(design.fixed.len(), "sensor is", "sensors are")) " kept; "
+                        (counted(design.count - design.fixed.len(), "is", "are")) " new."
                     }
                 }
                 li { (counted(design.count, "sensor", "sensors")) " out of " (counted(self.problem.candidates(), "candidate", "candidates")) ": " (kinds.join("; ")) "." }
                 li {
                     (counted(self.problem.contacts().len(), "contact", "contacts")) " over " (zone(design.contacts.from, design.contacts.to))
-                    ", " (stated(self.problem.force_n())) " N, force " (self.problem.force().name())
+                    ", " (rig_number(self.problem.force_n())) " N, force " (self.problem.force().name())
                     @let left_out = self.problem.contacts_over_supports().len();
                     @if left_out > 0 {
                         "; those over supports (" (left_out) ") are excluded from scores and limits, because an unknown force \
@@ -333,13 +335,13 @@ impl<'a> SensorDesignReport<'a> {
                 }
                 @if design.spacing_m > 0.0 { li { "Sensors are at least " (mm(design.spacing_m)) " mm apart." } }
                 @for kept in &design.keep_out { li { "Nothing sits within " (zone(kept.from, kept.to)) "." } }
-                @if design.must_have.len() > design.kept.len() {
+                @if design.must_have.len() > design.fixed.len() {
                     li {
-                        (counted(design.must_have.len() - design.kept.len(), "sensor is", "sensors are"))
+                        (counted(design.must_have.len() - design.fixed.len(), "sensor is", "sensors are"))
                         " part of every layout."
                     }
                 }
-                @if let Some(budget) = design.budget { li { "All together cost at most " (stated(budget)) "." } }
+                @if let Some(budget) = design.budget { li { "All together cost at most " (rig_number(budget)) "." } }
                 @if design.symmetry == Symmetry::Wanted { li { "Layouts mirror themselves." } }
                 @if design.symmetry == Symmetry::Forbidden { li { "No sensor mirrors another." } }
             }

@@ -3,7 +3,7 @@
 use maud::html;
 
 use super::error_lines::in_milli;
-use super::numbers::{counted, mm, stated};
+use super::numbers::{counted, mm, rig_number};
 use super::page::Figure;
 use super::{Axis, Chart, Marker, Series};
 use palpate_estimators::digit::LinearTheory;
@@ -32,7 +32,7 @@ pub(super) fn shapes_figure(what: &str, digit: &Digit, layout: &Layout, force_n:
     let at = |share: f64| Contact { position: Position::along(share * l), force_n };
     let mut series = vec![Series::dashes("untouched", 6, points(Contact { force_n: 0.0, ..at(1.0) }))];
     for (colour, share) in DRAWN_CONTACTS.into_iter().enumerate() {
-        let label = format!("{} N at {} mm", stated(force_n), mm(share * l));
+        let label = format!("{} N at {} mm", rig_number(force_n), mm(share * l));
         series.push(Series::line(label, colour, points(at(share))));
         let [x_m, y_m] = digit.shape(at(share)).point(share * l);
         series.push(Series::markers("", colour, in_milli(vec![(x_m, y_m)]), Marker::Circle));
@@ -47,7 +47,7 @@ pub(super) fn shapes_figure(what: &str, digit: &Digit, layout: &Layout, force_n:
         Chart { width_px: 640, ..Chart::new("The finger, exactly bent", x, y, series).with_height(720) };
     let caption = html! {
         (what) ": a finger clamped at 0 with " (counted(layout.len(), "strain gauge", "strain gauges")) ", bent by "
-        (stated(force_n)) " N that " (match digit.direction() {
+        (rig_number(force_n)) " N that " (match digit.direction() {
             ForceDirection::Normal => "push across the bent finger",
             ForceDirection::Vertical => "hang straight down",
         }) ", at three places (discs). Beyond the contact the finger is straight."
@@ -64,7 +64,7 @@ pub(super) fn force_limit_figure(unknown: &LimitCurve) -> Figure {
         vec![Series::line("position unknown, estimated along", 1, points)],
     );
     let caption = html! {
-        "The limit of the force, " (stated(unknown.force_n)) " N, at each contact position. A contact has none with fewer than \
+        "The limit of the force, " (rig_number(unknown.force_n)) " N, at each contact position. A contact has none with fewer than \
          two sensitive gauges: one gauge determines only force times lever arm."
     };
     Figure::chart(&chart, caption)

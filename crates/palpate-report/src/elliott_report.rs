@@ -3,7 +3,7 @@
 
 use maud::{Markup, html};
 
-use super::numbers::{NOTHING, mm, number, spread, whole};
+use super::numbers::{NOTHING, mm, number, quantile_range, whole};
 use super::page::{Figure, Page, ReportFile, Section, Table};
 use super::{Axis, Chart, ErrorPoint, Marker, Series};
 use palpate_estimators::evaluation::Quantiles;
@@ -139,7 +139,7 @@ impl ElliottReport<'_> {
              5th to 95th percentile. Limit: of the inputs of the chain, for one reading."
         };
         let shown = |figure: Option<Quantiles>| {
-            figure.map_or_else(|| NOTHING.to_owned(), |figure| spread(figure, number))
+            figure.map_or_else(|| NOTHING.to_owned(), |figure| quantile_range(figure, number))
         };
         Table::from_rows(&self.findings.rows)
             .short("chain", |row| row.chain.to_string())

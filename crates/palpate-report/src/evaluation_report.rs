@@ -10,7 +10,7 @@ use super::{Axis, Chart, Marker, Series};
 use palpate_estimators::description;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::evaluation::{
-    ErrorSummary, Evaluation, Located, Portion, Quantiles, percentage_error,
+    ErrorSummary, EvaluatedContact, Evaluation, Portion, Quantiles, percentage_error,
 };
 use palpate_estimators::recording::Provenance;
 use palpate_estimators::setup::Setup;
@@ -27,7 +27,7 @@ pub struct EvaluationReport<'a> {
     /// Page title.
     pub title: &'a str,
     /// Origin of the estimates.
-    pub judged: Judged<'a>,
+    pub origin: EstimateOrigin<'a>,
     /// Estimates.
     pub evaluation: &'a Evaluation,
     /// Origin of the located readings.
@@ -40,7 +40,7 @@ pub struct EvaluationReport<'a> {
 
 /// Origin of the estimates.
 #[derive(Clone, Copy, Debug)]
-pub enum Judged<'a> {
+pub enum EstimateOrigin<'a> {
     /// One locator.
     Locator(&'a Locator),
     /// Locators of one rig, each fitted without the positions that it located.
@@ -68,7 +68,7 @@ pub fn evaluation_report(report: &EvaluationReport) -> Vec<ReportFile> {
     let sections = vec![
         Section::new("errors", heading).figure(errors).figure(report.estimate_figure()),
         Section::new("table", "Errors in numbers").table(report.errors_table()),
-        Section::new("judged", report.judged_heading()).table(report.facts_table()),
+        Section::new("judged", report.origin_heading()).table(report.facts_table()),
     ];
     Page::new(report.title, report.summary(), sections).with_source(report.source_in_words()).files()
 }
@@ -82,7 +82,7 @@ impl EvaluationReport<'_> {
                 ", at " (counted(self.evaluation.by_position().len(), "position", "positions")) ", located and compared \
                  with where the contact was."
             }
-            li { (self.whose_answers()) }
+            li { (self.origin_text()) }
             @if let Some(summary) = self.evaluation.summary(None) {
                 li {
                     "Average error " b { (number(summary.average_m * 1e3)) " mm" } ", "
@@ -118,24 +118,24 @@ impl EvaluationReport<'_> {
         }
     }
 
-    fn whose_answers(&self) -> String {
-        match self.judged {
-            Judged::CrossValidated { folds, .. } => format!(
+    fn origin_text(&self) -> String {
+        match self.origin {
+            EstimateOrigin::CrossValidated { folds, .. } => format!(
                 "Cross-validated by position in {}: each position was located by a locator that had not seen it.",
                 counted(folds, "fold", "folds")
             ),
-            Judged::Locator(locator) if *self.recording == locator.provenance.recording => {
+            EstimateOrigin::Locator(locator) if *self.recording == locator.provenance.recording => {
                 "The locator was fitted to this recording, so these are training errors; errors at other positions are larger."
                     .to_owned()
             }
-            Judged::Locator(_) => "The locator was fitted to another recording.".to_owned(),
+            EstimateOrigin::Locator(_) => "The locator was fitted to another recording.".to_owned(),
         }
     }
 
     fn setup(&self) -> &Setup {
-        match self.judged {
-            Judged::Locator(locator) => &locator.setup,
-            Judged::CrossValidated { rig, .. } => &rig.setup,
+        match self.origin {
+            EstimateOrigin::Locator(locator) => &locator.setup,
+            EstimateOrigin::CrossValidated { rig, .. } => &rig.setup,
         }
     }
 
@@ -143,10 +143,10 @@ impl EvaluationReport<'_> {
         self.setup().surface().extent()
     }
 
-    fn judged_heading(&self) -> &'static str {
-        match self.judged {
-            Judged::Locator(_) => "The locator",
-            Judged::CrossValidated { .. } => "The rig",
+    fn origin_heading(&self) -> &'static str {
+        match self.origin {
+            EstimateOrigin::Locator(_) => "The locator",
+            EstimateOrigin::CrossValidated { .. } => "The rig",
         }
     }
 
@@ -188,8 +188,8 @@ impl EvaluationReport<'_> {
         let length_mm = self.evaluation.extent.length_m() * 1e3;
         let identity = vec![(0.0, 0.0), (length_mm, length_mm)];
         let mut series = vec![Series::dashes("estimated = true", 6, identity)];
-        let along = |located: &Located| (located.truth.x_m, located.estimate.x_m);
-        let across = |located: &Located| (located.truth.y_m, located.estimate.y_m);
+        let along = |located: &EvaluatedContact| (located.truth.x_m, located.estimate.x_m);
+        let across = |located: &EvaluatedContact| (located.truth.y_m, located.estimate.y_m);
         match self.extent() {
             Extent::Line { .. } => series.extend(self.estimates("estimated", 0, along)),
             Extent::Plane { .. } => {
@@ -216,7 +216,7 @@ impl EvaluationReport<'_> {
         &self,
         label: &str,
         colour: usize,
-        coordinate: impl Fn(&Located) -> (f64, f64),
+        coordinate: impl Fn(&EvaluatedContact) -> (f64, f64),
     ) -> Vec<Series> {
         let mut pairs = in_milli(self.evaluation.located.iter().map(coordinate).collect());
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -235,7 +235,8 @@ impl EvaluationReport<'_> {
         let everywhere = std::iter::once(("everywhere".to_owned(), None));
         let portions = self.portions.iter().map(|portion| (stretch(*portion), Some(*portion)));
         let rows = everywhere.chain(portions).filter_map(|(name, portion)| {
-            let inside = |located: &&Located| portion.is_none_or(|portion| portion.contains(located.truth));
+            let inside =
+                |located: &&EvaluatedContact| portion.is_none_or(|portion| portion.contains(located.truth));
             let located = self.evaluation.located.iter().filter(inside).copied().collect();
             let part = Evaluation { extent: self.evaluation.extent, located };
             Some((name, part, self.evaluation.summary(portion)?))
@@ -274,9 +275,9 @@ impl EvaluationReport<'_> {
             ("sensors", text(self.sensors_in_words())),
             ("contact force", text(force)),
         ];
-        facts.extend(match self.judged {
-            Judged::Locator(locator) => locator_facts(locator),
-            Judged::CrossValidated { rig, folds, seed } => rig_facts(rig, folds, seed),
+        facts.extend(match self.origin {
+            EstimateOrigin::Locator(locator) => locator_facts(locator),
+            EstimateOrigin::CrossValidated { rig, folds, seed } => rig_facts(rig, folds, seed),
         });
         Table::from_rows(facts)
             .short("fact", |(name, _)| *name)
@@ -306,9 +307,9 @@ impl EvaluationReport<'_> {
     }
 
     fn source_in_words(&self) -> Markup {
-        let seed = match self.judged {
-            Judged::Locator(locator) => locator.provenance.seed,
-            Judged::CrossValidated { seed, .. } => seed,
+        let seed = match self.origin {
+            EstimateOrigin::Locator(locator) => locator.provenance.seed,
+            EstimateOrigin::CrossValidated { seed, .. } => seed,
         };
         html! { " from " (self.recording.source) (digests(self.recording)) "; fitted from seed " (seed) }
     }

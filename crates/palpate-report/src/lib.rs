@@ -10,7 +10,7 @@
 //! use palpate_mechanics::sensing::SensorKind::Deflection;
 //! use palpate_mechanics::surface::Beam;
 //! use palpate_mechanics::units::{gpa, mm, newtons, um};
-//! use palpate_report::{EvaluationReport, Judged, evaluation_report};
+//! use palpate_report::{EstimateOrigin, EvaluationReport, evaluation_report};
 //!
 //! let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
 //! let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
@@ -18,7 +18,7 @@
 //! let locator = Estimator::Influence(Influence::default()).fit(&setup, &presses)?;
 //! let files = evaluation_report(&EvaluationReport {
 //!     title: "How well the locator remembers",
-//!     judged: Judged::Locator(&locator),
+//!     origin: EstimateOrigin::Locator(&locator),
 //!     evaluation: &Evaluation::new(&locator, &presses)?,
 //!     recording: &presses.provenance,
 //!     portions: &[],
@@ -84,7 +84,7 @@ pub use drawing::{
     chart_to_svg, heat_map_to_svg,
 };
 pub use elliott_report::elliott_report;
-pub use evaluation_report::{EvaluationReport, Judged, evaluation_report};
+pub use evaluation_report::{EstimateOrigin, EvaluationReport, evaluation_report};
 pub use limit_report::{LimitReport, limit_report};
 pub use page::ReportFile;
 pub use paper_report::paper_report;

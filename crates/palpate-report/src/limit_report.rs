@@ -7,11 +7,11 @@ use super::digit_figures::{force_limit_figure, linear_theory_figures};
 use super::drawing::chart::Extremes;
 use super::error_lines::in_milli;
 use super::maps::{limits_mm, sensors_mm};
-use super::numbers::{counted, mm, number, place, quantity, stated};
+use super::numbers::{counted, mm, number, place, quantity, rig_number};
 use super::page::{Figure, Page, ReportFile, Section, Table};
 use super::{Axis, Chart, HeatMap, HeatPanel, Mark, Series};
+use palpate_estimators::detectable_force::{DetectableForce, TouchSummary};
 use palpate_estimators::estimator::Cells;
-use palpate_estimators::lightest_touch::{LightestTouch, TouchSummary};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::{CramerRaoBound, Force, LimitCurve, LimitWarning};
@@ -33,9 +33,9 @@ pub struct LimitReport<'a> {
     /// Limit.
     pub limit: &'a CramerRaoBound<'a>,
     /// Limit over the surface for a known force.
-    pub known: &'a LimitCurve,
+    pub known_force: &'a LimitCurve,
     /// Limit over the surface for an unknown force.
-    pub unknown: &'a LimitCurve,
+    pub unknown_force: &'a LimitCurve,
     /// Knowledge of the force on this bench, which the warnings assume.
     pub force: Force,
     /// Warnings of the limit.
@@ -43,7 +43,7 @@ pub struct LimitReport<'a> {
     /// Positions for the table.
     pub listed: &'a [Position],
     /// Smallest detectable force.
-    pub touch: &'a LightestTouch<'a>,
+    pub touch: &'a DetectableForce<'a>,
 }
 
 /// Returns `report.html` and its figures as SVG files.
@@ -63,8 +63,8 @@ pub struct LimitReport<'a> {
 ///     title: "What physics allows on the paper's beam",
 ///     setup: &setup,
 ///     limit: &limit,
-///     known: &LimitCurve::over_surface(&limit, 3.0, Force::Known)?,
-///     unknown: &LimitCurve::over_surface(&limit, 3.0, Force::Unknown)?,
+///     known_force: &LimitCurve::over_surface(&limit, 3.0, Force::Known)?,
+///     unknown_force: &LimitCurve::over_surface(&limit, 3.0, Force::Unknown)?,
 ///     force: Force::Known,
 ///     warnings: &[],
 ///     listed: &[],
@@ -74,8 +74,8 @@ pub struct LimitReport<'a> {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn limit_report(report: &LimitReport) -> Vec<ReportFile> {
-    let (layout, force_n) = (report.setup.layout(), report.known.force_n);
-    let (heading, figure) = match report.known.extent {
+    let (layout, force_n) = (report.setup.layout(), report.known_force.force_n);
+    let (heading, figure) = match report.known_force.extent {
         Extent::Line { .. } => ("The limit along the surface", report.limit_figure()),
         Extent::Plane { .. } => ("The limit over the surface", report.limit_map()),
     };
@@ -99,37 +99,37 @@ pub fn limit_report(report: &LimitReport) -> Vec<ReportFile> {
 impl LimitReport<'_> {
     fn curve(&self) -> &LimitCurve {
         match self.force {
-            Force::Known => self.known,
-            Force::Unknown => self.unknown,
+            Force::Known => self.known_force,
+            Force::Unknown => self.unknown_force,
         }
     }
 
     fn summary(&self) -> Markup {
-        let extent = self.known.extent;
+        let extent = self.known_force.extent;
         let percent = |limit_m: f64| number(100.0 * limit_m / extent.length_m());
         let at = |(position, limit_m): (Position, f64)| {
             format!("{} mm at {} mm", number(limit_m * 1e3), place(position, extent))
         };
         html! {
             li {
-                "What physics allows on this bench: " (counted(self.limit.alive(), "live sensor", "live sensors")) ", "
-                (stated(self.known.force_n)) " N, force " (self.force.name()) "."
+                "What physics allows on this bench: " (counted(self.limit.enabled_count(), "live sensor", "live sensors")) ", "
+                (rig_number(self.known_force.force_n)) " N, force " (self.force.name()) "."
             }
             @if let Some(summary) = self.curve().summary() {
                 li {
                     "Median limit " b { (number(summary.median_m * 1e3)) " mm" } ", " (percent(summary.median_m))
                     " % of the length; mean " (number(summary.mean_m * 1e3)) " mm, smallest " (at(summary.best))
                     ", largest " (at(summary.worst)) "."
-                    @if let Some(words) = self.curve().not_told_in_words() {
+                    @if let Some(words) = self.curve().unidentifiable_text() {
                         " Excluded, because the position is unidentifiable there: " (words) "."
                     }
                 }
             } @else {
                 li { "With this knowledge of the force the position is unidentifiable everywhere." }
             }
-            @if let Some(surely) = self.surely() {
+            @if let Some(surely) = self.confident_summary() {
                 li {
-                    "Smallest force that is detected in " (stated(100.0 * surely.found)) " % of its readings (lightest touch): median "
+                    "Smallest force that is detected in " (rig_number(100.0 * surely.found)) " % of its readings (lightest touch): median "
                     b { (number(surely.median_n)) " N" } ", largest " (number(surely.worst.1)) " N at "
                     (place(surely.worst.0, extent)) " mm; an untouched surface gives a contact in " (self.touch.rate().to_string())
                     " of its readings."
@@ -140,12 +140,14 @@ impl LimitReport<'_> {
     }
 
     fn limit_figure(&self) -> Figure {
-        let length_mm = self.known.extent.length_m() * 1e3;
+        let length_mm = self.known_force.extent.length_m() * 1e3;
         let line = |curve: &LimitCurve, label, colour| {
             Series::line(label, colour, in_milli(curve.by_x(|bound| bound.sd_position_m)))
         };
-        let series =
-            vec![line(self.known, "force known", 0), line(self.unknown, "force unknown, estimated along", 1)];
+        let series = vec![
+            line(self.known_force, "force known", 0),
+            line(self.unknown_force, "force unknown, estimated along", 1),
+        ];
         let extremes = Extremes::from_lines(&series);
         let chart = Chart::new(
             "The least standard deviation of a located contact",
@@ -156,11 +158,11 @@ impl LimitReport<'_> {
         .with_marks(self.marks(extremes.greatest > length_mm))
         .with_height(480);
         let caption = html! {
-            "The limit at each contact position, for " (stated(self.known.force_n)) " N. No unbiased estimator has a smaller \
+            "The limit at each contact position, for " (rig_number(self.known_force.force_n)) " N. No unbiased estimator has a smaller \
              standard deviation; where its errors are Gaussian, its mean error is √(2/π) ≈ 0.8 of it on a line."
             @if !self.warnings.is_empty() { " Shaded: what the warnings are about." }
             @if extremes.greatest > MOST_LENGTHS * length_mm {
-                " Limits above " (stated(MOST_LENGTHS)) " lengths are not shown: contacts there cannot be located."
+                " Limits above " (rig_number(MOST_LENGTHS)) " lengths are not shown: contacts there cannot be located."
             }
         };
         Figure::chart(&chart, caption)
@@ -168,7 +170,7 @@ impl LimitReport<'_> {
 
     /// Zones of the warnings; with `beyond`, also a line at the length of the surface.
     fn marks(&self, beyond: bool) -> Vec<Mark> {
-        let length_m = self.known.extent.length_m();
+        let length_m = self.known_force.extent.length_m();
         let label = format!("length of the surface, {} mm", mm(length_m));
         let length = beyond.then_some(Mark::HorizontalLine { y: length_m * 1e3, label });
         let zones = self.warnings.iter().flat_map(|warning| {
@@ -187,10 +189,11 @@ impl LimitReport<'_> {
     }
 
     fn limit_map(&self) -> Figure {
-        let extent = self.known.extent;
+        let extent = self.known_force.extent;
         let cells = Cells::nearly_square(extent, CELLS, CELLS_A_SIDE);
         let panel = |name, force| {
-            let limits = limits_mm(self.limit, &cells, (self.known.force_n, force), |b| b.sd_position_m);
+            let limits =
+                limits_mm(self.limit, &cells, (self.known_force.force_n, force), |b| b.sd_position_m);
             HeatPanel::new(name, limits)
         };
         let panels =
@@ -209,7 +212,7 @@ impl LimitReport<'_> {
             width_px: 860,
         };
         let caption = html! {
-            "The limit at each contact position, for " (stated(self.known.force_n)) " N: the root of the sum of the least variances \
+            "The limit at each contact position, for " (rig_number(self.known_force.force_n)) " N: the root of the sum of the least variances \
              along and across. No unbiased estimator has a smaller one."
             @if !map.dots_mm.is_empty() { " Dots: the sensors." }
             @if cut_off { " Limits above the length of the surface have its colour: contacts there cannot be located." }
@@ -220,13 +223,13 @@ impl LimitReport<'_> {
 
     fn digit_figures(&self) -> Vec<Figure> {
         let SurfaceSpec::Digit(digit) = self.setup.surface() else { return Vec::new() };
-        let force_limit = force_limit_figure(self.unknown);
+        let force_limit = force_limit_figure(self.unknown_force);
         std::iter::once(force_limit).chain(linear_theory_figures(self.setup, self.limit, digit)).collect()
     }
 
     fn limit_table(&self) -> Table {
         let bounds = self.listed.iter().map(|&position| {
-            let contact = Contact { position, force_n: self.known.force_n };
+            let contact = Contact { position, force_n: self.known_force.force_n };
             (position, [Force::Known, Force::Unknown].map(|force| self.limit.bound_at(contact, force)))
         });
         let caption = html! {
@@ -234,7 +237,7 @@ impl LimitReport<'_> {
              position is unidentifiable."
         };
         Table::from_rows(bounds)
-            .short("position, mm", |(position, _)| place(*position, self.known.extent))
+            .short("position, mm", |(position, _)| place(*position, self.known_force.extent))
             .mm("force known: limit, mm", |(_, [known, _])| known.map(|bound| bound.sd_position_m))
             .mm("mean error, mm", |(_, [known, _])| known.map(|bound| bound.mean_error_m()))
             .mm("force unknown: limit, mm", |(_, [_, unknown])| unknown.map(|bound| bound.sd_position_m))
@@ -244,14 +247,14 @@ impl LimitReport<'_> {
     }
 
     /// Summary for the higher detection probability.
-    fn surely(&self) -> Option<TouchSummary> {
-        let positions: Vec<Position> = self.known.points.iter().map(|point| point.position).collect();
+    fn confident_summary(&self) -> Option<TouchSummary> {
+        let positions: Vec<Position> = self.known_force.points.iter().map(|point| point.position).collect();
         let [_, surely] = self.touch.summaries(&positions);
         surely
     }
 
     fn lightest_touch_in_words(&self) -> Markup {
-        let [half, surely] = LightestTouch::FOUND.map(|found| stated(100.0 * found));
+        let [half, surely] = DetectableForce::FOUND.map(|found| rig_number(100.0 * found));
         html! {
             p {
                 "Below some force a reading is " code { "no_contact" } ": it can come from noise alone, or from the scatter of the untouched \
@@ -259,19 +262,19 @@ impl LimitReport<'_> {
                 " of its readings (" code { "false_alarm_rate" } " in the rig). The smallest detectable force (lightest touch) is detected in "
                 (half) " % and in " (surely) " % of its readings, by a locator without a known force."
             }
-            @if let Some(TouchSummary { without: without @ 1.., .. }) = self.surely() {
+            @if let Some(TouchSummary { undetected: without @ 1.., .. }) = self.confident_summary() {
                 p { "At " (counted(without, "position", "positions")) " no force is detected." }
             }
         }
     }
 
     fn touch_figure(&self) -> Option<Figure> {
-        let length_mm = self.known.extent.length_m() * 1e3;
-        let Extent::Line { .. } = self.known.extent else { return None };
+        let length_mm = self.known_force.extent.length_m() * 1e3;
+        let Extent::Line { .. } = self.known_force.extent else { return None };
         let line = |i: usize| {
-            let points = self.known.points.iter().map(|point| point.position);
+            let points = self.known_force.points.iter().map(|point| point.position);
             let force = |at: Position| (at.x_m * 1e3, self.touch.forces_at(at)[i].unwrap_or(f64::NAN));
-            let label = format!("found in {} %", stated(100.0 * LightestTouch::FOUND[i]));
+            let label = format!("found in {} %", rig_number(100.0 * DetectableForce::FOUND[i]));
             Series::line(&label, i, points.map(force).collect())
         };
         let series = vec![line(0), line(1)];
@@ -314,7 +317,7 @@ impl LimitReport<'_> {
             .numeric("position, mm", |(sensor, _)| match sensor.kind {
                 // The place of a raw channel is unknown.
                 SensorKind::Raw => "–".to_owned(),
-                _ => place(sensor.position, self.known.extent),
+                _ => place(sensor.position, self.known_force.extent),
             })
             .wide("noise", |(sensor, _)| noise_in_words(sensor))
             .caption(html! { "The sensors and their noise, from which the limit follows." })
@@ -342,7 +345,7 @@ fn sentence(words: &str) -> String {
 
 fn noise_in_words(sensor: &Sensor) -> String {
     let channel = &sensor.channel;
-    if channel.dead {
+    if channel.disabled {
         return "dead: left out".to_owned();
     }
     let in_unit = |value| match sensor.kind {

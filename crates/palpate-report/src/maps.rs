@@ -96,7 +96,7 @@ pub(super) fn in_mm(position: Position) -> (f64, f64) {
     (position.x_m * 1e3, position.y_m * 1e3)
 }
 
-pub(super) struct Designed<'a> {
+pub(super) struct DesignMap<'a> {
     pub name: &'a str,
     pub values: Vec<f64>,
     pub dots_mm: Vec<(f64, f64)>,
@@ -107,7 +107,7 @@ pub(super) struct Designed<'a> {
 pub(super) fn compared_maps(
     cells: Cells,
     label: &str,
-    designs: Vec<Designed>,
+    designs: Vec<DesignMap>,
     title: impl Fn(&str) -> String,
     caption: impl Fn(&str, &str) -> Markup,
 ) -> Vec<Figure> {
@@ -115,7 +115,7 @@ pub(super) fn compared_maps(
     let mut finite: Vec<f64> = values.filter(|value| value.is_finite()).collect();
     finite.sort_by(f64::total_cmp);
     let most = percentile(&finite, 95.0).unwrap_or(1.0);
-    let figure = |Designed { name, values, dots_mm }: Designed| {
+    let figure = |DesignMap { name, values, dots_mm }: DesignMap| {
         let panels = vec![HeatPanel::new("", values)];
         let (title, label) = (title(name), label.to_owned());
         let map = HeatMap { title, cells, panels, dots_mm, label, most, width_px: 640 };

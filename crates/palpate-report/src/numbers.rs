@@ -78,14 +78,14 @@ pub(crate) fn stretch(portion: Portion) -> String {
 }
 
 /// As in a rig file: "3", "200", "0.25".
-pub(crate) fn stated(value: f64) -> String {
+pub(crate) fn rig_number(value: f64) -> String {
     let text = format!("{value:.4}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 /// Median with 5th and 95th percentile: "2.38 (2.26–2.73)"; the median alone if all three read
 /// alike.
-pub(crate) fn spread(spread: Quantiles, shown: fn(f64) -> String) -> String {
+pub(crate) fn quantile_range(spread: Quantiles, shown: fn(f64) -> String) -> String {
     let [median, low, high] = [spread.median, spread.p05, spread.p95].map(shown);
     if low == median && high == median { median } else { format!("{median} ({low}–{high})") }
 }
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn micro_is_a_letter_of_its_own_in_print() {
+    fn micro_sign_is_one_letter() {
         let shown = [quantity(5e-6, Dimension::Length), quantity(1e-6, Dimension::Strain)];
         assert_eq!(shown, ["5 µm", "1 µε"]);
         assert_eq!(quantity(5e-3, Dimension::Force), "5 mN");
@@ -135,8 +135,11 @@ mod tests {
 
     #[test]
     fn a_spread_of_one_value_is_that_value() {
-        assert_eq!(spread(Quantiles { median: 2.0, p05: 2.0, p95: 2.0 }, number), "2.00");
-        assert_eq!(spread(Quantiles { median: 2.0, p05: 1.0, p95: 30.0 }, number), "2.00 (1.00–30.0)");
+        assert_eq!(quantile_range(Quantiles { median: 2.0, p05: 2.0, p95: 2.0 }, number), "2.00");
+        assert_eq!(
+            quantile_range(Quantiles { median: 2.0, p05: 1.0, p95: 30.0 }, number),
+            "2.00 (1.00–30.0)"
+        );
     }
 
     #[test]

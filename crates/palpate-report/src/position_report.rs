@@ -4,11 +4,11 @@ use maud::{Markup, html};
 
 use super::bench_figures::{row_axis, row_height};
 use super::drawing::chart::Extremes;
-use super::maps::{Designed, compared_maps, in_mm};
+use super::maps::{DesignMap, compared_maps, in_mm};
 use super::numbers::{counted, mm, number};
 use super::page::{Figure, Page, ReportFile, Section, Table};
 use super::{Axis, Chart, Marker, Series};
-use palpate_design::positions::{Placed, Placement, PositionProblem, best_placed};
+use palpate_design::positions::{Placement, PositionProblem, VerifiedPositions, best_placed};
 use palpate_estimators::estimator::Cells;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::surface::Extent;
@@ -25,7 +25,7 @@ pub struct PositionDesignReport<'a> {
     /// Design problem.
     pub problem: &'a PositionProblem,
     /// Arrangements.
-    pub placed: &'a [Placed],
+    pub placed: &'a [VerifiedPositions],
 }
 
 /// Returns `report.html` and its figures as SVG files.
@@ -46,15 +46,15 @@ pub fn position_design_report(report: &PositionDesignReport) -> Vec<ReportFile> 
 }
 
 impl<'a> PositionDesignReport<'a> {
-    fn even(&self) -> Option<&'a Placed> {
+    fn even(&self) -> Option<&'a VerifiedPositions> {
         self.placed.iter().find(|placed| placed.placement == Placement::Even)
     }
 
-    fn best(&self) -> Option<&'a Placed> {
+    fn best(&self) -> Option<&'a VerifiedPositions> {
         best_placed(self.placed)
     }
 
-    fn compared(&self) -> Vec<&'a Placed> {
+    fn compared(&self) -> Vec<&'a VerifiedPositions> {
         let best = self.best().filter(|best| best.placement != Placement::Even);
         self.even().into_iter().chain(best).collect()
     }
@@ -62,7 +62,7 @@ impl<'a> PositionDesignReport<'a> {
     fn summary(&self) -> Markup {
         let Some(best) = self.best() else { return html! {} };
         let design = self.problem.design();
-        let median = |placed: &Placed| placed.verification.median_error_m * 1e3;
+        let median = |placed: &VerifiedPositions| placed.verification.median_error_m * 1e3;
         html! {
             li {
                 "Best of " (counted(self.placed.len(), "arrangement", "arrangements")) " of "
@@ -120,11 +120,11 @@ impl<'a> PositionDesignReport<'a> {
 
     fn errors_figure(&self) -> Figure {
         let contacts = &self.problem.contacts().positions;
-        let points = |placed: &Placed| {
+        let points = |placed: &VerifiedPositions| {
             let errors = contacts.iter().zip(&placed.errors_m);
             errors.map(|(at, error_m)| (at.x_m * 1e3, error_m * 1e3)).collect()
         };
-        let line = |(i, placed): (usize, &Placed)| {
+        let line = |(i, placed): (usize, &VerifiedPositions)| {
             let name = placed.placement.name();
             if i == 0 {
                 Series::dashes(name, 6, points(placed))
@@ -142,7 +142,7 @@ impl<'a> PositionDesignReport<'a> {
         let contacts = &self.problem.contacts().positions;
         let columns = contacts.iter().take_while(|at| at.y_m == contacts[0].y_m).count().max(1);
         let cells = Cells { extent: self.setup.surface().extent(), columns, rows: contacts.len() / columns };
-        let designed = |placed: &'a Placed| Designed {
+        let designed = |placed: &'a VerifiedPositions| DesignMap {
             name: placed.placement.name(),
             values: placed.errors_m.iter().map(|error_m| error_m * 1e3).collect(),
             dots_mm: placed.positions.iter().copied().map(in_mm).collect(),

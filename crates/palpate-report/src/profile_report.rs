@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::maps::sensors_mm;
-use super::numbers::{NOTHING, counted, decimals, mm, number, place, stated};
+use super::numbers::{NOTHING, counted, decimals, mm, number, place, rig_number};
 use super::page::{Columns, Figure, Page, ReportFile, Section, Table};
 use super::{Axis, BandPoint, Chart, HeatMap, HeatPanel, Mark, Marker, Series};
 use palpate_estimators::estimator::{ForceBounds, LoadProfile, Patch, PatchLimit, Resolution, Status};
@@ -341,7 +341,7 @@ fn tenths_mm(length_m: f64) -> String {
 }
 
 fn status_in_words(profile: &LoadProfile) -> Markup {
-    let (misfit, worst) = (number(profile.misfit), stated(profile.worst_misfit.round()));
+    let (misfit, worst) = (number(profile.chi_squared), rig_number(profile.worst_misfit.round()));
     match profile.status {
         Status::NoContact => html! { "No contact: the reading does not exceed its noise." },
         Status::OutsideModel => html! {

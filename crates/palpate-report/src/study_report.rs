@@ -8,7 +8,7 @@ use super::error_lines::{banded, limit_in_words, limit_line_of_arm, limit_line_o
 use super::numbers::{NOTHING, counted, listed, mm, number, stretch, whole};
 use super::page::{Figure, Page, ReportFile, Section, Table, text};
 use super::{Axis, Chart, Marker, Series};
-use palpate_estimators::evaluation::{Located, Portion, Quantiles};
+use palpate_estimators::evaluation::{EvaluatedContact, Portion, Quantiles};
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::Extent;
 use palpate_studies::{Arm, ArmOutcome, ArmResults, PreparedStudy, RunFacts, StudyResults};
@@ -53,7 +53,7 @@ pub fn study_report(report: &StudyReport) -> Vec<ReportFile> {
 
 fn summary(report: &StudyReport) -> Markup {
     let arms = report.results.arms.len();
-    let positions = report.study.judging().positions.len();
+    let positions = report.study.evaluation_settings().positions.len();
     let [one, many] = report.noun();
     html! {
         li {
@@ -81,7 +81,7 @@ pub(super) fn least_error(report: &StudyReport) -> Option<Markup> {
 pub(super) fn longest(report: &StudyReport) -> Option<Markup> {
     let median = |arm: &&ArmResults| arm.effective_length_percent.median;
     let best = report.results.arms.iter().max_by(|a, b| median(a).total_cmp(&median(b)))?;
-    let tolerance = mm(report.study.judging().tolerance_m);
+    let tolerance = mm(report.study.evaluation_settings().tolerance_m);
     Some(html! {
         "Largest effective length: " b { (best.name) } ", which is within " (tolerance) " mm on "
         (number(median(&best))) " % of the surface (median)."
@@ -123,16 +123,16 @@ fn overview(report: &StudyReport) -> Option<Figure> {
     Some(Figure::chart(&chart, caption))
 }
 
-struct Compared {
+struct ComparisonRow {
     label: String,
     error: fn(&ArmResults) -> Option<Quantiles>,
     limit: fn(&ArmResults) -> Option<f64>,
 }
 
 /// Errors over all positions and in the first portion, or between and beyond training positions.
-fn compared(report: &StudyReport) -> Vec<Compared> {
-    if report.study.judging().training_span {
-        let span = |label: &str, error: fn(&ArmResults) -> Option<Quantiles>| Compared {
+fn compared(report: &StudyReport) -> Vec<ComparisonRow> {
+    if report.study.evaluation_settings().training_span {
+        let span = |label: &str, error: fn(&ArmResults) -> Option<Quantiles>| ComparisonRow {
             label: label.to_owned(),
             error,
             limit: |_| None,
@@ -144,12 +144,12 @@ fn compared(report: &StudyReport) -> Vec<Compared> {
             span("beyond them", |arm| arm.training_span.as_ref()?.error_percent_beyond_training),
         ];
     }
-    let all = report.judged_portion().map(|portion| Compared {
+    let all = report.evaluated_portion().map(|portion| ComparisonRow {
         label: stretch(portion),
         error: |arm| Some(arm.error_percent),
         limit: |arm| Some(arm.limit.as_ref()?.limit_error_percent),
     });
-    let first = report.study.judging().portions.first().map(|portion| Compared {
+    let first = report.study.evaluation_settings().portions.first().map(|portion| ComparisonRow {
         label: stretch(*portion),
         error: |arm| Some(arm.portions.first()?.error_percent),
         limit: |arm| arm.portions.first()?.limit_error_percent,
@@ -254,7 +254,7 @@ fn shared(report: &StudyReport, title: &str, arms: &[&Arm]) -> Option<Figure> {
 
 fn limit_of(arm: &Arm, colour: usize, label: &str) -> Option<Series> {
     let setup = &arm.rig.setup;
-    limit_line_of_arm(setup, setup.force_n().or(arm.rig.pressed_setup().ok()?.force_n())?, colour, label)
+    limit_line_of_arm(setup, setup.force_n().or(arm.rig.training_setup().ok()?.force_n())?, colour, label)
 }
 
 #[derive(Clone, Copy)]
@@ -294,8 +294,8 @@ impl<'a> StudyReport<'a> {
         }
     }
 
-    pub(crate) fn judged_portion(&self) -> Option<Portion> {
-        let positions = &self.study.judging().positions;
+    pub(crate) fn evaluated_portion(&self) -> Option<Portion> {
+        let positions = &self.study.evaluation_settings().positions;
         Some(Portion { from_m: positions.first()?.x_m, to_m: positions.last()?.x_m })
     }
 
@@ -322,9 +322,9 @@ impl<'a> StudyReport<'a> {
 }
 
 /// Quantiles over an arm's seeds, by position in mm.
-pub(crate) fn spread_by_position(
+pub(crate) fn quantiles_by_position(
     outcome: &ArmOutcome,
-    figure: impl Fn(&Located) -> f64,
+    figure: impl Fn(&EvaluatedContact) -> f64,
 ) -> Vec<(f64, Quantiles)> {
     outcome.by_position(figure).into_iter().map(|(x_m, spread)| (x_m * 1e3, spread)).collect()
 }
@@ -332,7 +332,7 @@ pub(crate) fn spread_by_position(
 /// Location errors in mm; empty without a fit.
 pub(crate) fn errors(report: &StudyReport, line: &ArmLine, with_band: bool) -> Vec<Series> {
     let Some(outcome) = report.outcome(line.arm) else { return Vec::new() };
-    let along = spread_by_position(outcome, |located| located.error_m() * 1e3);
+    let along = quantiles_by_position(outcome, |located| located.error_m() * 1e3);
     banded(line.label, line.colour, &along, with_band && outcome.fits.len() > 1)
 }
 
@@ -350,7 +350,8 @@ pub(crate) fn chart_of_errors(report: &StudyReport, title: &str, series: Vec<Ser
     let length_mm = report.length_m() * 1e3;
     let x = Axis::linear("load position, mm").from_to(0.0, length_mm);
     let y = Axis::log10("location error, mm").from_to(LEAST_ERROR_MM, length_mm);
-    Chart::new(title, x, y, series).with_marks(vec![tolerance_mark(report.study.judging().tolerance_m)])
+    Chart::new(title, x, y, series)
+        .with_marks(vec![tolerance_mark(report.study.evaluation_settings().tolerance_m)])
 }
 
 /// Errors cross zero, which a logarithmic axis cannot show.
@@ -385,9 +386,9 @@ fn arm_columns(report: &StudyReport) -> Vec<ArmColumn> {
     let spread = |heading: &str, of: &dyn Fn(&ArmResults) -> Option<Quantiles>| {
         column(heading, &|arm| Some(stacked(of(arm)?, number)))
     };
-    let judging = report.study.judging();
-    let in_words = |portion: &Portion| unbroken(&stretch(*portion));
-    let all = report.judged_portion().map(|portion| in_words(&portion));
+    let judging = report.study.evaluation_settings();
+    let in_words = |portion: &Portion| without_line_breaks(&stretch(*portion));
+    let all = report.evaluated_portion().map(|portion| in_words(&portion));
     let portions: Vec<String> = judging.portions.iter().map(in_words).collect();
 
     let mut columns = vec![
@@ -407,7 +408,7 @@ fn arm_columns(report: &StudyReport) -> Vec<ArmColumn> {
     columns.extend([
         column("training positions, mm", &|arm| {
             let span = stretch(arm.training_span.as_ref()?.training_span);
-            Some(text(unbroken(span.trim_end_matches(" mm"))))
+            Some(text(without_line_breaks(span.trim_end_matches(" mm"))))
         }),
         spread("average error between them, %", &|arm| {
             arm.training_span.as_ref()?.error_percent_within_training
@@ -439,7 +440,7 @@ fn stacked(spread: Quantiles, shown: fn(f64) -> String) -> Markup {
     html! { (median) @if low != median || high != median { span.range { (low) "–" (high) } } }
 }
 
-fn unbroken(text: &str) -> String {
+fn without_line_breaks(text: &str) -> String {
     text.replace(' ', "\u{a0}").replace('–', "\u{2060}–\u{2060}")
 }
 
@@ -485,7 +486,7 @@ pub(crate) fn source(report: &StudyReport) -> Markup {
 }
 
 pub(crate) fn glossary(report: &StudyReport) -> Markup {
-    let tolerance = mm(report.study.judging().tolerance_m);
+    let tolerance = mm(report.study.evaluation_settings().tolerance_m);
     html! {
         dl {
             dt { "Training positions" }

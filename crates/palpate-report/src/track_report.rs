@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::maps::in_mm;
-use super::numbers::{counted, number, stated, whole};
+use super::numbers::{counted, number, rig_number, whole};
 use super::page::{Figure, Page, ReportFile, Section, Table};
 use super::{Axis, BandPoint, Chart, Marker, Series};
 use palpate_estimators::estimator::Track;
@@ -179,7 +179,7 @@ impl TrackReport<'_> {
             None => (*track.contacts.get(coordinate.contact)?, None),
         };
         let (place_m, (low_m, high_m)) = if coordinate.across {
-            tracked.across.map(|across| (across.y_m, across.y_95_m))?
+            tracked.transverse.map(|across| (across.y_m, across.y_95_m))?
         } else {
             (tracked.x_m, tracked.x_95_m)
         };
@@ -229,7 +229,7 @@ impl TrackReport<'_> {
 
     fn sweep_table(&self) -> Table {
         Table::from_rows(self.sweep)
-            .numeric("ratio", |speed| stated(speed.ratio))
+            .numeric("ratio", |speed| rig_number(speed.ratio))
             .number("speed, m/s", |speed| speed.speed_m_per_s)
             .mm("single, mm", |speed| speed.filtered.single_m)
             .mm("filter, mm", |speed| speed.filtered.track_m)

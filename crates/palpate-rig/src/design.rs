@@ -3,7 +3,8 @@
 use serde::Deserialize;
 
 use palpate_design::sensors::{
-    ContactPrior, DesignCriterion, KeepOut, MustHave, SensorDesign, SensorOffer, Sites, Supply, Symmetry,
+    ContactPrior, DesignCriterion, KeepOut, RequiredSensor, SensorDesign, SensorOffer, Sites, Supply,
+    Symmetry,
 };
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::limit::Force;
@@ -13,7 +14,9 @@ use palpate_mechanics::surface::Extent;
 use crate::document::{At, place};
 use crate::error::RigError;
 use crate::sensors::kind_on;
-use crate::values::{AtLeastZero, Count, Length, NotNegative, Number, Point, Positive, Written, check_order};
+use crate::values::{
+    AtLeastZero, Count, Length, NotNegative, Number, Point, Positive, RawQuantity, check_order,
+};
 
 /// Limit for a reasonable search time.
 const MOST_SITES: i64 = 1_000_000;
@@ -44,7 +47,7 @@ pub(crate) struct DesignKeys {
     pub keep_out: Vec<At<ZoneKeys>>,
     /// Sensors that every layout has.
     #[serde(default)]
-    pub must_have: Vec<At<MustHaveKeys>>,
+    pub must_have: Vec<At<RequiredSensorKeys>>,
     /// Greatest cost of all sensors together.
     pub budget: Option<NotNegative<Number>>,
     /// Symmetry of layouts; `any` by default.
@@ -73,9 +76,9 @@ pub(crate) struct OfferKeys {
     /// Kind.
     pub measure: At<SensorKind>,
     /// Standard deviation of a reading's noise; that of the rig's own sensors of the kind by default.
-    pub noise: Option<At<Written>>,
+    pub noise: Option<At<RawQuantity>>,
     /// Step to which a reading is rounded; that of the rig's own sensors of the kind by default.
-    pub resolution: Option<At<Written>>,
+    pub resolution: Option<At<RawQuantity>>,
     /// Cost of one; 1 by default.
     pub cost: Option<NotNegative<Number>>,
 }
@@ -107,7 +110,7 @@ pub(crate) struct ZoneKeys {
 /// A sensor that every layout has.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a sensor such as { measure = \"deflection\", at = \"200 mm\" }")]
-pub(crate) struct MustHaveKeys {
+pub(crate) struct RequiredSensorKeys {
     /// Kind; optional if there is only one kind.
     pub measure: Option<At<SensorKind>>,
     /// Position.
@@ -139,7 +142,7 @@ impl At<DesignKeys> {
             spacing_m: self.spacing.map_or(default.spacing_m, |spacing| spacing.si),
             keep_out: self.keep_out.iter().map(|zone| zone.build(extent)).collect::<Result<_, _>>()?,
             must_have: must_have.collect::<Result<_, _>>()?,
-            kept: default.kept,
+            fixed: default.fixed,
             budget: self.budget.map(|budget| budget.si),
             symmetry: self.symmetry.unwrap_or(default.symmetry),
             offers,
@@ -156,7 +159,7 @@ fn offers(listed: &At<Vec<At<OfferKeys>>>, setup: &Setup) -> Result<Vec<SensorOf
         let offer = keys.build(setup)?;
         if offers.iter().any(|other| other.kind == offer.kind) {
             let value = format!("{} for the second time", offer.kind);
-            return Err(keys.measure.place.refuse_as(value, "another kind; each is offered once"));
+            return Err(keys.measure.place.refuse_value(value, "another kind; each is offered once"));
         }
         offers.push(offer);
     }
@@ -169,13 +172,13 @@ impl At<OfferKeys> {
         let kind = kind_on(setup.surface(), &self.measure)?;
         let own = setup.layout().sensors().iter().find(|sensor| sensor.kind == kind);
         let own = own.map_or_else(ChannelModel::default, |sensor| sensor.channel);
-        let size = |key: &Option<At<Written>>, own| {
+        let size = |key: &Option<At<RawQuantity>>, own| {
             key.as_ref().map_or(Ok(own), |written| written.si::<AtLeastZero>(kind.dimension()))
         };
         let channel = ChannelModel {
             noise_sd: size(&self.noise, own.noise_sd)?,
             resolution: size(&self.resolution, own.resolution)?,
-            dead: false,
+            disabled: false,
             ..own
         };
         if channel.noise_sd == 0.0 && channel.resolution == 0.0 {
@@ -217,7 +220,7 @@ impl At<SitesKeys> {
 
 impl At<ContactsKeys> {
     fn build(&self, extent: Extent) -> Result<ContactPrior, RigError> {
-        let default = ContactPrior::all_over(extent);
+        let default = ContactPrior::over_surface(extent);
         let end = |key: &Option<At<Point>>, default| {
             key.as_ref().map_or(Ok(default), |point| point.on_surface(extent))
         };
@@ -248,8 +251,8 @@ impl At<ZoneKeys> {
     }
 }
 
-impl At<MustHaveKeys> {
-    fn build(&self, offers: &[SensorOffer], extent: Extent) -> Result<MustHave, RigError> {
+impl At<RequiredSensorKeys> {
+    fn build(&self, offers: &[SensorOffer], extent: Extent) -> Result<RequiredSensor, RigError> {
         let position = self.at.on_surface(extent)?;
         let offer = match &self.measure {
             None if offers.len() == 1 => 0,
@@ -262,7 +265,7 @@ impl At<MustHaveKeys> {
                 })?
             }
         };
-        Ok(MustHave { offer, position })
+        Ok(RequiredSensor { offer, position })
     }
 }
 
@@ -281,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn the_example_says_what_it_says() {
+    fn example_has_its_values() {
         let design = Rig::from_toml(RIG).unwrap().design.unwrap();
         assert_eq!((design.count, design.sites, design.force), (8, Sites::Every(0.005), Force::Unknown));
         assert_eq!(design.contacts.from, Position::along(0.02));
@@ -306,7 +309,7 @@ mod tests {
         );
         let design = design.unwrap().design.unwrap();
         assert_eq!(design.sites, Sites::At(vec![Position::along(0.01), Position::along(0.03)]));
-        assert_eq!(design.must_have, [MustHave { offer: 1, position: Position::along(0.03) }]);
+        assert_eq!(design.must_have, [RequiredSensor { offer: 1, position: Position::along(0.03) }]);
         assert_eq!((design.criterion, design.symmetry), (DesignCriterion::WorstLimit, Symmetry::Forbidden));
         assert_eq!((design.budget, design.spacing_m, design.tolerance_m), (Some(12.5), 0.005, 0.001));
         assert_eq!((design.offers[0].cost, design.offers[1].channel.noise_sd), (3.0, 5e-6));
@@ -314,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_design_is_said_with_its_place() {
+    fn invalid_design_is_refused_at_its_place() {
         let cases = [
             "count = 0",
             "sites = \"5 N\"",

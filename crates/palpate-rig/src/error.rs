@@ -176,11 +176,11 @@ impl Place {
     }
 
     pub fn refuse(&self, bound: impl Display) -> RigError {
-        self.refuse_as(&self.written, bound)
+        self.refuse_value(&self.written, bound)
     }
 
     /// As [`Place::refuse`], with `value` in the message.
-    pub fn refuse_as(&self, value: impl Display, bound: impl Display) -> RigError {
+    pub fn refuse_value(&self, value: impl Display, bound: impl Display) -> RigError {
         let (value, bound) = (value.to_string(), bound.to_string());
         RigProblem::OutOfRange { key: self.key().to_owned(), value, bound }.at_place(self)
     }

@@ -18,7 +18,7 @@ use palpate_mechanics::sensing::Layout;
 
 use crate::document::At;
 use crate::error::{RigError, RigProblem};
-use crate::values::{AboveZero, Count, FalseAlarms, Force, Fraction, Number, Positive, Written};
+use crate::values::{AboveZero, Count, FalseAlarms, Force, Fraction, Number, Positive, RawQuantity};
 
 /// The method that locates.
 #[derive(Clone, Debug, Deserialize)]
@@ -59,7 +59,7 @@ pub(crate) struct NetworkKeys {
     /// Coding of the output; `normalized` by default.
     pub output: Option<OutputCoding>,
     /// Scaling of readings to inputs: `full-scale`, `standardized`, or a reading to divide by; `full-scale` by default.
-    pub input_scale: Option<At<Written>>,
+    pub input_scale: Option<At<RawQuantity>>,
     /// The step along the gradient; 0.7 by default.
     pub learning_rate: Option<Positive<Number>>,
     /// The share of the previous step that is repeated; 0.9 by default.
@@ -196,8 +196,8 @@ impl NetworkKeys {
     }
 }
 
-fn input_scale(scale: &At<Written>, layout: &Layout) -> Result<InputScale, RigError> {
-    if let Written::Text(text) = &**scale {
+fn input_scale(scale: &At<RawQuantity>, layout: &Layout) -> Result<InputScale, RigError> {
+    if let RawQuantity::Text(text) = &**scale {
         match text.as_str() {
             "full-scale" => return Ok(InputScale::FullScale),
             "standardized" => return Ok(InputScale::Standardized),

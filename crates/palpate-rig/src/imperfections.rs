@@ -119,7 +119,7 @@ impl At<ImperfectionsKeys> {
             [one] => Ok([one.build(), Relaxation::default()]),
             [one, two] => Ok([one.build(), two.build()]),
             others => {
-                Err(keys.place.refuse_as(format!("a list of {}", others.len()), "one, or a list of two"))
+                Err(keys.place.refuse_value(format!("a list of {}", others.len()), "one, or a list of two"))
             }
         }
     }

@@ -32,7 +32,7 @@ impl Study {
             self.name,
             self.arms.len(),
             self.seeds,
-            self.judging.positions.len()
+            self.evaluation.positions.len()
         )];
         if let Some(arm) = self.arms.first() {
             lines.extend(description::setup(&arm.rig.setup));

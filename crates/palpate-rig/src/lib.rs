@@ -67,7 +67,7 @@ pub use first_rig::{FirstRig, FirstRigError, Hints, shell_word};
 pub use rig::{Rig, RigSimulationError};
 pub use sections::RigSections;
 pub use stage::Stage;
-pub use study::{Arm, AskedLayout, Judging, Study};
+pub use study::{Arm, EvaluationSettings, RequestedLayout, Study};
 pub use table_in_words::table_in_words;
 
 #[cfg(test)]

@@ -55,7 +55,7 @@ pub(crate) fn build(
         others => {
             let place = others.get(2).map_or(&sections.place, |third| &third.place);
             let value = format!("a list of {}", others.len());
-            return Err(place.refuse_as(value, "one, or a list of two"));
+            return Err(place.refuse_value(value, "one, or a list of two"));
         }
     };
     let extent = surface.extent();
@@ -68,7 +68,7 @@ pub(crate) fn build(
         return Err(damping.place.unused("a plate, which is in balance at every reading"));
     }
     if let (Extent::Plane { .. }, Some(second)) = (extent, second) {
-        return Err(second.place.refuse_as("a list of two", "one on a plane"));
+        return Err(second.place.refuse_value("a list of two", "one on a plane"));
     }
     let rate_hz = first.rate.as_ref().ok_or_else(|| first.place.missing("rate"))?.si;
     let moving = MovingContacts {
@@ -80,7 +80,7 @@ pub(crate) fn build(
     let readings = moving.duration_s() * rate_hz;
     if readings > MOST_READINGS || !readings.is_finite() {
         let value = format!("{readings} readings long");
-        return Err(sections.place.refuse_as(value, format!("at most {MOST_READINGS}")));
+        return Err(sections.place.refuse_value(value, format!("at most {MOST_READINGS}")));
     }
     Ok(moving)
 }
@@ -113,7 +113,7 @@ impl At<MotionKeys> {
         let (from, to) = (self.from.on_surface(extent)?, self.to.on_surface(extent)?);
         let way_m = from.distance_m(to);
         if way_m == 0.0 {
-            return Err(self.to.place.refuse_as(extent.place_in_words(to), "elsewhere than `from`"));
+            return Err(self.to.place.refuse_value(extent.place_in_words(to), "elsewhere than `from`"));
         }
         let turn_m = match &self.turn {
             Some(turn) if turn.si > 0.5 * way_m => {
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_motion_on_a_plate_is_said_with_its_place() {
+    fn invalid_motion_on_a_plate_is_refused_at_its_place() {
         let from = "from = [\"50 mm\", \"80 mm\"]";
         let cases = [
             (from, "from = \"50 mm\"".to_owned()),
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn a_second_contact_has_a_force_of_its_own() {
+    fn second_contact_has_a_separate_force() {
         let moving = Rig::from_toml(&with_second("force = \"2 N\"")).unwrap().motion.unwrap();
         let forces = |time_s| moving.contacts_at(time_s, 3.0).into_iter().map(|contact| contact.force_n);
         assert!(forces(0.0).eq([3.0, 2.0]));
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_second_contact_is_said_with_its_place() {
+    fn invalid_second_contact_is_refused_at_its_place() {
         let third = "[[motion]]\nfrom = \"1 mm\"\nto = \"9 mm\"\nspeed = \"1 m/s\"";
         let told = ["rate = \"1 kHz\"", "damping = 0.1", "force = \"-1 N\"", third]
             .map(|keys| complaint(&with_second(keys)));
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_motion_is_said_with_its_place() {
+    fn invalid_motion_is_refused_at_its_place() {
         let cases = [
             ("density = \"7850 kg/m3\"", ""),
             ("density = \"7850 kg/m3\"", "density = \"7850 kg\""),

@@ -223,7 +223,7 @@ impl At<RecordingKeys> {
     fn nuisances(&self) -> Result<Vec<ValueColumn>, RigError> {
         let Some(listed) = &self.nuisance else {
             return match &self.nuisance_unit {
-                Some(symbols) => Err(self.alone("nuisance", &symbols.place)),
+                Some(symbols) => Err(self.unpaired_key("nuisance", &symbols.place)),
                 None => Ok(Vec::new()),
             };
         };
@@ -251,7 +251,7 @@ impl At<RecordingKeys> {
         each.collect()
     }
 
-    fn alone(&self, key: &str, place: &Place) -> RigError {
+    fn unpaired_key(&self, key: &str, place: &Place) -> RigError {
         let (section, key) = (self.place.path.clone(), key.to_owned());
         RigProblem::MissingKey { section, key }.at_place(place)
     }
@@ -265,7 +265,7 @@ impl At<RecordingKeys> {
         unit: Unit,
     ) -> Result<Option<ValueColumn>, RigError> {
         match (column, symbol) {
-            (None, Some(symbol)) => Err(self.alone(key, &symbol.place)),
+            (None, Some(symbol)) => Err(self.unpaired_key(key, &symbol.place)),
             (column, _) => Ok(column.as_ref().map(|column| ValueColumn { column: column.column(), unit })),
         }
     }
@@ -276,7 +276,7 @@ fn distinct(listed: &[At<ColumnKey>]) -> Result<Vec<Column>, RigError> {
     let columns: Vec<_> = listed.iter().map(|column| column.column()).collect();
     if let Some(again) = (1..columns.len()).find(|i| columns[..*i].contains(&columns[*i])) {
         let place = &listed[again].place;
-        return Err(place.refuse_as(format!("{} again", place.written), "a column of its own"));
+        return Err(place.refuse_value(format!("{} again", place.written), "a column of its own"));
     }
     Ok(columns)
 }

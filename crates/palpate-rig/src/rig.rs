@@ -65,7 +65,7 @@ impl Rig {
         let setup = sections.setup()?;
         Ok(Self {
             training: sections.training(&setup)?,
-            estimator: sections.estimator(&setup)?.unwrap_or_else(|| Estimator::usual(&setup)),
+            estimator: sections.estimator(&setup)?.unwrap_or_else(|| Estimator::default_for(&setup)),
             loads: sections.loads(setup.surface())?,
             motion: sections.motion(&setup)?,
             design: sections.design(&setup)?,
@@ -78,9 +78,9 @@ impl Rig {
     ///
     /// # Errors
     /// [`OutOfRange`] for an invalid force.
-    pub fn pressed_setup(&self) -> Result<Setup, OutOfRange> {
+    pub fn training_setup(&self) -> Result<Setup, OutOfRange> {
         match &self.training {
-            Some(training) => self.setup.pressed_by(training),
+            Some(training) => self.setup.with_training_force(training),
             None => Ok(self.setup.clone()),
         }
     }
@@ -122,7 +122,7 @@ impl Rig {
         watch: Watch,
     ) -> Result<Recording, RigSimulationError> {
         let recorded = self.simulate_watched(seed, watch)?;
-        Ok(recorded.zeroed(self.setup.recording_columns().zero).map_err(SimulateError::from)?)
+        Ok(recorded.subtract_zero(self.setup.recording_columns().zero).map_err(SimulateError::from)?)
     }
 
     /// Calibration at the training positions, for simulations.
@@ -191,7 +191,7 @@ impl Rig {
         watch: Watch,
     ) -> Result<TimedRecording, RigSimulationError> {
         let moving = self.motion.as_ref().ok_or(RigSimulationError::NoMotion)?;
-        let pressed = self.pressed_setup().map_err(SimulateError::from)?;
+        let pressed = self.training_setup().map_err(SimulateError::from)?;
         Ok(simulate_moving_watched(&pressed, moving, seed, watch)?)
     }
 }

@@ -164,7 +164,7 @@ impl RigSections {
         let values = training.count.saturating_mul(rows).saturating_mul(setup.layout().len());
         if values > MOST_VALUES {
             let value = format!("{values} values, positions × repeats × sensors");
-            return Err(keys.place.refuse_as(value, format!("at most {MOST_VALUES}")));
+            return Err(keys.place.refuse_value(value, format!("at most {MOST_VALUES}")));
         }
         Ok(Some(training))
     }

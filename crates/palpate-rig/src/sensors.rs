@@ -11,7 +11,7 @@ use crate::document::At;
 use crate::error::{RigError, RigProblem};
 use crate::recording::{ColumnKey, RecordingKeys};
 use crate::values::{AtLeastZero, Count, Finite, Fraction, Grid, Length, NotNegative, OneOrMany, Point};
-use crate::values::{ON_A_PLANE, Written};
+use crate::values::{ON_A_PLANE, RawQuantity};
 
 const MOST: i64 = 10_000;
 
@@ -29,13 +29,13 @@ pub(crate) struct SensorsKeys {
     /// Positions of the sensors, one by one.
     pub positions: Option<At<Vec<At<Point>>>>,
     /// Standard deviation of a reading's noise; 0 by default.
-    pub noise: Option<At<Written>>,
+    pub noise: Option<At<RawQuantity>>,
     /// Step to which a reading is rounded; 0 by default.
-    pub resolution: Option<At<Written>>,
+    pub resolution: Option<At<RawQuantity>>,
     /// Largest error of the gain, errors being uniform within ± this; 0 by default.
     pub gain_error: Option<Fraction>,
     /// Largest offset, offsets being uniform within ± this; 0 by default.
-    pub offset_error: Option<At<Written>>,
+    pub offset_error: Option<At<RawQuantity>>,
     /// Largest error of a sensor's position along each side of the surface, errors being uniform within ± this; 0 by default.
     pub position_error: Option<At<NotNegative<Length>>>,
     /// The lowest and highest reading; unlimited by default.
@@ -47,7 +47,7 @@ pub(crate) struct SensorsKeys {
 
 #[derive(Clone, Debug, Deserialize)]
 #[serde(expecting = "a list of 2, the lower value first")]
-pub(crate) struct RangeKeys(At<Written>, At<Written>);
+pub(crate) struct RangeKeys(At<RawQuantity>, At<RawQuantity>);
 
 pub(crate) fn build(
     sections: &At<OneOrMany<SensorsKeys>>,
@@ -62,13 +62,13 @@ pub(crate) fn build(
         let kind = kind_on(surface, &keys.measure)?;
         let positions = keys.positions(surface, channel_count)?;
         let channel = keys.channel(kind)?;
-        let dead = keys.dead(positions.len())?;
+        let dead = keys.disabled_sensors(positions.len())?;
         let before = sensors.iter().filter(|sensor| sensor.kind == kind).count();
         sensors.extend(positions.into_iter().enumerate().map(|(i, position)| Sensor {
             kind,
             position,
             name: format!("{kind}_{}", before + i + 1),
-            channel: ChannelModel { dead: dead.contains(&i), ..channel },
+            channel: ChannelModel { disabled: dead.contains(&i), ..channel },
         }));
     }
     if sensors.is_empty() {
@@ -145,7 +145,7 @@ impl At<SensorsKeys> {
 
     fn channel(&self, kind: SensorKind) -> Result<ChannelModel, RigError> {
         let dimension = kind.dimension();
-        let size = |key: &Option<At<Written>>| {
+        let size = |key: &Option<At<RawQuantity>>| {
             key.as_ref().map_or(Ok(0.0), |written| written.si::<AtLeastZero>(dimension))
         };
         // A reaction sensor is part of its support, and the place of a raw channel has no effect.
@@ -159,7 +159,7 @@ impl At<SensorsKeys> {
                 let (lowest, highest) = (low.si::<Finite>(dimension)?, high.si::<Finite>(dimension)?);
                 if lowest >= highest {
                     let value = format!("{} to {}", low.place.written, high.place.written);
-                    return Err(range.place.refuse_as(value, "a list of 2, the lower value first"));
+                    return Err(range.place.refuse_value(value, "a list of 2, the lower value first"));
                 }
                 Some((lowest, highest))
             }
@@ -171,11 +171,11 @@ impl At<SensorsKeys> {
             offset_error: size(&self.offset_error)?,
             position_error_m: self.position_error.as_ref().map_or(0.0, |error| error.si),
             range,
-            dead: false,
+            disabled: false,
         })
     }
 
-    fn dead(&self, count: usize) -> Result<Vec<usize>, RigError> {
+    fn disabled_sensors(&self, count: usize) -> Result<Vec<usize>, RigError> {
         let index = |number: &At<i64>| match usize::try_from(**number) {
             Ok(from_1 @ 1..) if from_1 <= count => Ok(from_1 - 1),
             _ => Err(number.place.refuse(format!("the number of a sensor of this section, 1 to {count}"))),

@@ -145,7 +145,7 @@ depths = ["1 mm", "1.5 mm"]"#;
     }
 
     #[test]
-    fn what_no_machine_can_do_is_refused_with_its_bound() {
+    fn impossible_machine_settings_are_refused_with_the_bound() {
         let start = "origin = [\"0 mm\", \"0 mm\"]\ntouch = \"1 mm\"\n";
         for (rest, words) in [
             ("", "has no `depths`"),

@@ -35,7 +35,7 @@ pub struct Study {
     /// Arithmetic of training in lanes.
     pub precision: Precision,
     /// Positions and tolerance of the evaluation.
-    pub judging: Judging,
+    pub evaluation: EvaluationSettings,
     /// Arms, at least 1, with different names.
     pub arms: Vec<Arm>,
     /// SHA-256 of the study file, hexadecimal.
@@ -50,14 +50,14 @@ pub struct Arm {
     /// Rig; preparation replaces its layout by the requested one.
     pub rig: Rig,
     /// Requested layout by method.
-    pub layout: Option<AskedLayout>,
+    pub layout: Option<RequestedLayout>,
     /// Title of a shared figure in reports, if any.
     pub figure: Option<String>,
 }
 
 /// Request of a layout by a method.
 #[derive(Clone, Debug, PartialEq)]
-pub struct AskedLayout {
+pub struct RequestedLayout {
     /// Method.
     pub method: Method,
     /// Bytes of the method in the study file.
@@ -66,7 +66,7 @@ pub struct AskedLayout {
 
 /// Positions and tolerance of a study's evaluation.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Judging {
+pub struct EvaluationSettings {
     /// Even contact positions.
     pub positions: Vec<Position>,
     /// Readings per position with noisy sensors; at least 1.
@@ -181,18 +181,18 @@ impl Study {
         for (i, keys) in file.arm.iter().enumerate() {
             let arm = keys.build(&file, estimator(document.get_ref(), i)?)?;
             if arms.iter().any(|other| other.name == arm.name) {
-                return Err(keys.name.place.refuse_as(format!("{} again", arm.name), "a name of its own"));
+                return Err(keys.name.place.refuse_value(format!("{} again", arm.name), "a name of its own"));
             }
             arms.push(arm);
         }
         let missing = |section| RigProblem::MissingSection { section }.without_place();
         let first = arms.first().ok_or_else(|| missing("[[arm]]"))?;
-        let judging = file.judging(first)?;
+        let judging = file.evaluation_settings(first)?;
         Ok(Self {
             name: checked_name(&file.name)?,
             seeds: file.seeds.map_or(100, |seeds| seeds.get() as u64),
             precision: file.precision,
-            judging,
+            evaluation: judging,
             arms,
             digest: Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect(),
         })
@@ -233,7 +233,9 @@ impl ArmKeys {
         let layout = self.asked_layout()?;
         let rig = Rig::from_sections(&RigSections::from(rig))?;
         if let (Some(surface), None) = (&base.surface, rig.setup.surface().model()) {
-            return Err(surface.place.refuse_as("measured", "a surface with a model: a study simulates it"));
+            return Err(surface
+                .place
+                .refuse_value("measured", "a surface with a model: a study simulates it"));
         }
         if rig.training.is_none() {
             return Err(RigProblem::MissingSection { section: "[training]" }.without_place());
@@ -242,14 +244,14 @@ impl ArmKeys {
     }
 
     /// Sensor positions exclude a layout by method.
-    fn asked_layout(&self) -> Result<Option<AskedLayout>, RigError> {
+    fn asked_layout(&self) -> Result<Option<RequestedLayout>, RigError> {
         let Some(layout) = &self.layout else { return Ok(None) };
         for sensors in self.sensors.iter().flat_map(|sensors| sensors.sections()) {
             if let Some(key) = place(&sensors.positions).or(place(&sensors.grid)) {
                 return Err(key.unused("`layout`"));
             }
         }
-        Ok(Some(AskedLayout { method: **layout, span: layout.place.span.clone() }))
+        Ok(Some(RequestedLayout { method: **layout, span: layout.place.span.clone() }))
     }
 }
 
@@ -274,12 +276,12 @@ fn in_any_name(c: char) -> bool {
 }
 
 impl StudyFile {
-    fn judging(&self, first: &Arm) -> Result<Judging, RigError> {
+    fn evaluation_settings(&self, first: &Arm) -> Result<EvaluationSettings, RigError> {
         let extent = first.rig.setup.surface().extent();
         if let (Some(surface), Extent::Plane { .. }) = (&self.surface, extent) {
-            return Err(surface.place.refuse_as("a plane", "a line, along which a study judges"));
+            return Err(surface.place.refuse_value("a plane", "a line, along which a study judges"));
         }
-        let default = Judging {
+        let default = EvaluationSettings {
             positions: (1..400).map(|i| Position::along(f64::from(i) / 400.0 * extent.length_m())).collect(),
             readings: 5,
             tolerance_m: 2e-3,
@@ -287,7 +289,7 @@ impl StudyFile {
             training_span: false,
         };
         let Some(keys) = &self.evaluation else { return Ok(default) };
-        Ok(Judging {
+        Ok(EvaluationSettings {
             positions: keys.positions(extent.length_m())?,
             readings: keys.readings.map_or(default.readings, Count::get),
             tolerance_m: keys.tolerance.map_or(default.tolerance_m, |tolerance| tolerance.si),

@@ -33,8 +33,8 @@ pub fn table_in_words(name: &str, bytes: &[u8]) -> Result<Vec<String>, CsvError>
 }
 
 fn repeated_readings(name: &str, bytes: &[u8]) -> Option<String> {
-    let first = FirstRig::guess(name, bytes, &Hints::default()).ok()?;
+    let first = FirstRig::infer(name, bytes, &Hints::default()).ok()?;
     let rig = Rig::from_toml(&first.to_toml(name)).ok()?;
     let recording = rig.setup.read_recording(name, bytes).ok()?;
-    recording.provenance.repeats.filter(|repeats| repeats.left_out > 0).map(|repeats| repeats.to_string())
+    recording.provenance.repeats.filter(|repeats| repeats.removed > 0).map(|repeats| repeats.to_string())
 }

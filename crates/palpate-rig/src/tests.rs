@@ -22,7 +22,7 @@ const PAPER: &str = include_str!("../../../examples/paper.toml");
 const FSI_WATER: &str = include_str!("../../../examples/fsi-water.toml");
 
 #[test]
-fn the_papers_bench_is_what_the_paper_says() {
+fn papers_bench_has_the_published_values() {
     let rig = Rig::from_toml(PAPER).unwrap();
     let beam = Beam::new(0.4, 0.04, 0.0012, 200e9).unwrap();
     assert_eq!(rig.setup.surface(), &SurfaceSpec::Beam(beam));
@@ -332,7 +332,7 @@ fn a_bad_recording_section_is_refused_with_a_caret() {
 }
 
 #[test]
-fn every_key_can_be_said() {
+fn every_key_is_accepted() {
     let text = r#"
         [surface]
         kind = "beam"

@@ -46,9 +46,10 @@ impl ContactKeys {
         let ForceRangeKeys(least, greatest) = **range;
         let built = ForceRange::new(least.si, greatest.si);
         built.map(Some).map_err(|_| {
-            range
-                .place
-                .refuse_as(format!("{} N to {} N", least.si, greatest.si), "from a lesser to a greater force")
+            range.place.refuse_value(
+                format!("{} N to {} N", least.si, greatest.si),
+                "from a lesser to a greater force",
+            )
         })
     }
 

@@ -80,7 +80,7 @@ impl Bound for AlarmRange {
 
 impl<'de, D: Measure, B: Bound> Deserialize<'de> for Quantity<D, B> {
     fn deserialize<T: Deserializer<'de>>(deserializer: T) -> Result<Self, T::Error> {
-        let si = Written::deserialize(deserializer)?.si(D::DIMENSION).map_err(T::Error::custom)?;
+        let si = RawQuantity::deserialize(deserializer)?.si(D::DIMENSION).map_err(T::Error::custom)?;
         if B::holds(si) {
             Ok(Self { si, of: PhantomData })
         } else {
@@ -92,15 +92,15 @@ impl<'de, D: Measure, B: Bound> Deserialize<'de> for Quantity<D, B> {
 /// A quantity as it is written, with the dimension of its sensors.
 #[derive(Clone, Debug, serde::Deserialize)]
 #[serde(rename = "by shape", expecting = "a quantity such as \"400 mm\", or a number")]
-pub(crate) enum Written {
+pub(crate) enum RawQuantity {
     Text(String),
     Number(f64),
 }
 
 /// Share of the sensors' range, or quantity of the sensors.
-pub(crate) type ShareOrQuantity = Written;
+pub(crate) type ShareOrQuantity = RawQuantity;
 
-impl Written {
+impl RawQuantity {
     fn si(&self, wanted: Dimension) -> Result<f64, UnitError> {
         match self {
             Self::Text(text) => units::Quantity::parse_as(text, wanted),
@@ -113,9 +113,9 @@ impl Written {
     }
 }
 
-impl At<Written> {
+impl At<RawQuantity> {
     pub fn si<B: Bound>(&self, wanted: Dimension) -> Result<f64, RigError> {
-        match Written::si(self, wanted) {
+        match RawQuantity::si(self, wanted) {
             Ok(si) if B::holds(si) => Ok(si),
             Ok(_) => Err(self.place.refuse(B::WORDS)),
             Err(error) => Err(self.place.invalid(error)),
@@ -162,7 +162,7 @@ impl<const MOST: i64> At<Grid<MOST>> {
         let (columns, rows) = (self.0.get(), self.1.get());
         if columns.saturating_mul(rows) as u64 > MOST.unsigned_abs() {
             let bound = format!("at least 1 and at most {MOST} in all");
-            return Err(self.place.refuse_as(format!("{columns} × {rows}"), bound));
+            return Err(self.place.refuse_value(format!("{columns} × {rows}"), bound));
         }
         Ok((columns, rows))
     }
@@ -197,7 +197,7 @@ impl At<Point> {
             position if extent.contains(position) => Ok(position),
             position => {
                 let bound = format!("on the surface, within {}", extent.bounds_in_words());
-                Err(self.place.refuse_as(extent.place_in_words(position), bound))
+                Err(self.place.refuse_value(extent.place_in_words(position), bound))
             }
         }
     }
@@ -214,7 +214,7 @@ pub(crate) fn check_order(
         return Ok(());
     }
     let bound = format!("beyond `from`, {}", extent.place_in_words(from));
-    Err(place.refuse_as(extent.place_in_words(to), bound))
+    Err(place.refuse_value(extent.place_in_words(to), bound))
 }
 
 /// One section, or several of one name.

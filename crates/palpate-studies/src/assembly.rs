@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use palpate_numerics::watch::Watch;
 
-use super::run::{ArmOutcome, PreparedStudy, StudyRunError, Trained};
+use super::run::{ArmFit, ArmOutcome, PreparedStudy, StudyRunError};
 use super::tables::{CheckpointError, FitRows, StudyTables, TableKind, shard_in};
 use super::task::{Shard, Task};
 
@@ -60,7 +60,7 @@ pub enum AssemblyError {
         wanted: u64,
     },
     /// Missing shards.
-    #[error("{} of {of} shards {} missing: {}", .missing.len(), if .missing.len() == 1 { "is" } else { "are" }, listed(.missing))]
+    #[error("{} of {of} shards {} missing: {}", .missing.len(), if .missing.len() == 1 { "is" } else { "are" }, join_numbers(.missing))]
     MissingShards {
         /// Shard numbers.
         missing: Vec<u64>,
@@ -92,7 +92,7 @@ pub enum AssemblyError {
     Nothing,
 }
 
-fn listed(numbers: &[u64]) -> String {
+fn join_numbers(numbers: &[u64]) -> String {
     const MOST: usize = 10;
     let mut shown: Vec<String> = numbers.iter().take(MOST).map(u64::to_string).collect();
     if numbers.len() > MOST {
@@ -114,7 +114,7 @@ pub struct ShardTables {
 #[derive(Clone, Debug)]
 pub struct MergedStudy {
     /// All fits.
-    pub fits: Vec<Trained>,
+    pub fits: Vec<ArmFit>,
     /// Number of seeds of every arm.
     pub seeds: u64,
 }
@@ -123,7 +123,7 @@ struct ReadShard<'t> {
     place: &'t str,
     shard: Shard,
     seeds: u64,
-    fits: Vec<Trained>,
+    fits: Vec<ArmFit>,
 }
 
 impl ReadShard<'_> {
@@ -231,10 +231,10 @@ impl PreparedStudy {
         Ok(ReadShard { place, shard, seeds, fits })
     }
 
-    fn check_complete(&self, fits: &[Trained], seeds: u64) -> Result<(), AssemblyError> {
+    fn check_complete(&self, fits: &[ArmFit], seeds: u64) -> Result<(), AssemblyError> {
         let name = |arm: usize| self.study.arms[arm].name.clone();
         let mut there = HashSet::new();
-        for Trained { arm, fit } in fits.iter().filter(|trained| trained.fit.seed < seeds) {
+        for ArmFit { arm, fit } in fits.iter().filter(|trained| trained.fit.seed < seeds) {
             if !there.insert((*arm, fit.seed)) {
                 return Err(AssemblyError::TwoOfAFit { arm: name(*arm), seed: fit.seed });
             }

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use palpate_estimators::centroid::Centroid;
 use palpate_estimators::estimator::{Estimator, contenders};
-use palpate_estimators::evaluation::{Evaluation, Located, Split, SplitOrigin, evaluate_splits};
+use palpate_estimators::evaluation::{EvaluatedContact, Evaluation, Split, SplitOrigin, evaluate_splits};
 use palpate_estimators::recording::{Recording, Row};
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::SimulateError;
@@ -39,7 +39,7 @@ pub struct DeadAreas {
     /// Tolerance of the effective length, m.
     pub tolerance_m: f64,
     /// Kinds of excluded estimators.
-    pub without: Vec<&'static str>,
+    pub excluded: Vec<&'static str>,
     /// Seed of noise and fits.
     pub seed: u64,
 }
@@ -67,7 +67,8 @@ pub struct DeadAreaResults {
     /// Rows by estimator and count.
     pub rows: Vec<DeadAreaRow>,
     /// Failed fits: sensing, kind, count and reason.
-    pub left_out: Vec<(String, &'static str, usize, String)>,
+    #[serde(rename = "left_out")]
+    pub omitted: Vec<(String, &'static str, usize, String)>,
 }
 
 /// Error of the study.
@@ -87,18 +88,18 @@ impl DeadAreas {
     /// # Errors
     /// [`DeadAreasError`] without model, force or training positions, or if cancelled.
     pub fn run(&self, watch: Watch) -> Result<DeadAreaResults, DeadAreasError> {
-        let mut findings = DeadAreaResults { rows: Vec::new(), left_out: Vec::new() };
+        let mut findings = DeadAreaResults { rows: Vec::new(), omitted: Vec::new() };
         for &count in &self.counts {
             let rig = self.with_sensors(count);
             let trials = rig.trials(self.calibrations, self.seed)?;
             for estimator in self.estimators(&rig) {
-                self.judge("distributive", &rig, &estimator, &trials, &mut findings, watch)?;
+                self.evaluate("distributive", &rig, &estimator, &trials, &mut findings, watch)?;
             }
             for spread in [PointSpread::Metres(FIXED_SPREAD_M), PointSpread::Pitches(0.5)] {
                 let array = ArraySensor::new(&rig, count, spread)?;
                 let trials = array.trials(self.calibrations, self.seed);
                 let estimator = Estimator::Centroid(Centroid);
-                self.judge(&array.name(), array.rig(), &estimator, &trials, &mut findings, watch)?;
+                self.evaluate(&array.name(), array.rig(), &estimator, &trials, &mut findings, watch)?;
             }
         }
         Ok(findings)
@@ -128,7 +129,7 @@ impl DeadAreas {
     fn estimators(&self, rig: &Rig) -> Vec<Estimator> {
         let rows = rig.training.as_ref().map_or(1, |training| training.count * training.repeats);
         let mut estimators = contenders(&rig.setup, &rig.estimator, rows);
-        estimators.retain(|estimator| !self.without.contains(&estimator.kind()));
+        estimators.retain(|estimator| !self.excluded.contains(&estimator.kind()));
         for estimator in &mut estimators {
             if let Estimator::Network(config) = estimator {
                 let most = u32::try_from(MOST_PRESENTATIONS / rows.max(1)).unwrap_or(u32::MAX).max(1);
@@ -138,7 +139,7 @@ impl DeadAreas {
         estimators
     }
 
-    fn judge(
+    fn evaluate(
         &self,
         sensing: &str,
         rig: &Rig,
@@ -162,7 +163,7 @@ impl DeadAreas {
             }
             Err(error) if Cancelled::caused(&error) => return Err(Cancelled),
             Err(error) => {
-                findings.left_out.push((sensing.to_owned(), estimator.kind(), sensors, error.to_string()));
+                findings.omitted.push((sensing.to_owned(), estimator.kind(), sensors, error.to_string()));
             }
         }
         Ok(())
@@ -243,7 +244,7 @@ impl ArraySensor {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_add(k));
             let training = self.recording(&self.presses, seed, &mut rng);
             let judged = self.recording(&judged, seed, &mut rng);
-            Split { training, judged, offsets: None, origin: SplitOrigin::Calibration }
+            Split { training, held_out: judged, offsets: None, origin: SplitOrigin::Calibration }
         };
         (0..count).map(trial).collect()
     }
@@ -327,7 +328,7 @@ impl FoldedErrors {
     }
 }
 
-fn pitches_off(places: &[f64], located: &Located) -> Option<f64> {
+fn pitches_off(places: &[f64], located: &EvaluatedContact) -> Option<f64> {
     let x_m = located.truth.x_m;
     let gap = places.windows(2).find(|gap| gap[0] <= x_m && x_m <= gap[1] && gap[0] < gap[1])?;
     Some((x_m - gap[0]).min(gap[1] - x_m) / (gap[1] - gap[0]))

@@ -70,12 +70,12 @@ mod tables;
 mod task;
 
 pub use assembly::{AssemblyError, MergedStudy, ShardTables};
-pub use palpate_rig::{Arm, AskedLayout, Judging, Study};
+pub use palpate_rig::{Arm, EvaluationSettings, RequestedLayout, Study};
 pub use results::{
     ArmResults, LimitResults, PortionResults, RunFacts, SensorPlace, SetUp, StudyResults, TrainingSpanResults,
 };
 pub use results_file::ResultsFile;
-pub use run::{ArmOutcome, OnTrained, PreparedStudy, RunOptions, StudyRunError, Trained, TrainedSeed};
+pub use run::{ArmFit, ArmOutcome, FitCallback, PreparedStudy, RunOptions, StudyRunError, TrainedSeed};
 pub use tables::{Checkpoint, CheckpointError, FitRows, RowProblem, StudyTables, TableKind};
 pub use task::{Shard, ShardError, Task};
 

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_2_PI;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Arm, ArmOutcome, Judging, PreparedStudy, RunOptions, TrainedSeed};
+use super::{Arm, ArmOutcome, EvaluationSettings, PreparedStudy, RunOptions, TrainedSeed};
 use palpate_estimators::evaluation::{
     ErrorSummary, Evaluation, Portion, Quantiles, limit_ratio, percentage_error,
 };
@@ -213,7 +213,7 @@ impl StudyResults {
         let results = |outcome: &ArmOutcome| {
             let arm = study.study.arms.iter().position(|arm| arm.name == outcome.name)?;
             let set_up = differ.then(|| set_ups[arm].clone());
-            ArmResults::new(outcome, &study.study.arms[arm], set_up, study.judging())
+            ArmResults::new(outcome, &study.study.arms[arm], set_up, study.evaluation_settings())
         };
         Self { arms: outcomes.iter().filter_map(results).collect() }
     }
@@ -239,7 +239,12 @@ impl SetUp {
 }
 
 impl ArmResults {
-    fn new(outcome: &ArmOutcome, arm: &Arm, set_up: Option<SetUp>, judging: &Judging) -> Option<Self> {
+    fn new(
+        outcome: &ArmOutcome,
+        arm: &Arm,
+        set_up: Option<SetUp>,
+        judging: &EvaluationSettings,
+    ) -> Option<Self> {
         let spread = |figure: &dyn Fn(&TrainedSeed) -> Option<f64>| {
             Quantiles::from_values(outcome.fits.iter().filter_map(figure).collect())
         };
@@ -285,8 +290,8 @@ impl ArmResults {
     }
 }
 
-fn allowed(arm: &Arm, judging: &Judging) -> Option<Vec<(Position, f64)>> {
-    let force_n = arm.rig.setup.force_n().or(arm.rig.pressed_setup().ok()?.force_n())?;
+fn allowed(arm: &Arm, judging: &EvaluationSettings) -> Option<Vec<(Position, f64)>> {
+    let force_n = arm.rig.setup.force_n().or(arm.rig.training_setup().ok()?.force_n())?;
     let errors_m = expected_errors_m(&arm.rig.setup, force_n, &judging.positions)?;
     Some(judging.positions.iter().copied().zip(errors_m).collect())
 }

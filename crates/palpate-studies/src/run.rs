@@ -8,7 +8,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use palpate_design::sensors::{DesignError, Method as DesignMethod, SensorDesign, SensorProblem};
 use palpate_estimators::estimator::{Estimator, FitError, Locator, Method};
 use palpate_estimators::evaluation::{
-    Calibrated, Calibration, Evaluation, EvaluationError, Located, Quantiles, Split,
+    Calibration, CalibrationTrial, EvaluatedContact, Evaluation, EvaluationError, Quantiles, Split,
 };
 use palpate_estimators::fit::{Fit, FitTask, SeedQueue};
 use palpate_estimators::network::{Network, TrainingOutcome};
@@ -17,7 +17,7 @@ use palpate_estimators::simulate::SimulateError;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::sensing::{ChannelModel, Layout};
 use palpate_numerics::watch::{Cancelled, Watch};
-use palpate_rig::{Arm, AskedLayout, Judging, RigSimulationError, Study};
+use palpate_rig::{Arm, EvaluationSettings, RequestedLayout, RigSimulationError, Study};
 
 use super::task::Task;
 
@@ -130,14 +130,14 @@ impl PreparedStudy {
     }
 
     /// Patterns presented in a fit; 0 without epochs.
-    pub fn presentations(&self, Trained { arm, fit }: &Trained) -> u64 {
+    pub fn presentations(&self, ArmFit { arm, fit }: &ArmFit) -> u64 {
         fit.training.map_or(0, |training| u64::from(training.epochs) * self.patterns(*arm) as u64)
     }
 
-    fn judge(&self, arm: usize, seed: u64, locator: Locator) -> Option<Trained> {
+    fn evaluate(&self, arm: usize, seed: u64, locator: Locator) -> Option<ArmFit> {
         let PreparedArm::InLanes(prepared) = &self.arms[arm] else { return None };
-        let evaluation = Evaluation::new(&locator, &prepared.trial.judged).ok()?;
-        Some(Trained { arm, fit: Calibrated { seed, locator, evaluation }.into() })
+        let evaluation = Evaluation::new(&locator, &prepared.trial.held_out).ok()?;
+        Some(ArmFit { arm, fit: CalibrationTrial { seed, locator, evaluation }.into() })
     }
 
     /// Index of an arm.
@@ -166,13 +166,13 @@ impl PreparedStudy {
         seed: u64,
         weights: Vec<f64>,
         outcome: TrainingOutcome,
-    ) -> Option<Trained> {
+    ) -> Option<ArmFit> {
         match &self.arms[arm] {
             PreparedArm::InLanes(prepared) => {
                 let Estimator::Network(network) = &prepared.estimator else { return None };
                 let task = prepared.task(Watch::NONE).seed(seed);
                 let locator = network.restore(task, weights, outcome).ok()??;
-                self.judge(arm, seed, locator.map(Method::Network))
+                self.evaluate(arm, seed, locator.map(Method::Network))
             }
             PreparedArm::SeedBySeed { calibration, .. } => {
                 let Estimator::Network(network) = &self.study.arms[arm].rig.estimator else { return None };
@@ -182,26 +182,27 @@ impl PreparedStudy {
                     Ok(None) | Err(_) => Err(Cancelled),
                 };
                 let fit = calibration.run_with(seed, Watch::NONE, restored).ok()?;
-                Some(Trained { arm, fit: fit.into() })
+                Some(ArmFit { arm, fit: fit.into() })
             }
         }
     }
 
     /// Positions and tolerance of the evaluation.
-    pub fn judging(&self) -> &Judging {
-        &self.study.judging
+    pub fn evaluation_settings(&self) -> &EvaluationSettings {
+        &self.study.evaluation
     }
 }
 
 impl PreparedArm {
     fn new(arm: &Arm, study: &Study) -> Result<Self, StudyRunError> {
-        let judging = &study.judging;
+        let judging = &study.evaluation;
         let simulated = |error| StudyRunError::Simulate { arm: arm.name.clone(), error };
         let setup = &arm.rig.setup;
         let perfect = setup.layout().sensors().iter().all(|sensor| sensor.channel == ChannelModel::default());
         match &arm.rig.estimator {
             Estimator::Network(network) if perfect => {
-                let calibration = arm.rig.calibration().map_err(simulated)?.judged_at(&judging.positions, 1);
+                let calibration =
+                    arm.rig.calibration().map_err(simulated)?.with_contacts(&judging.positions, 1);
                 let trial = calibration.simulate(0).map_err(|error| simulated(error.into()))?;
                 let network = Network { precision: study.precision, ..network.clone() };
                 let estimator = Estimator::Network(network);
@@ -212,7 +213,7 @@ impl PreparedArm {
                 let noisy = setup.layout().sensors().iter().any(|sensor| sensor.channel.noise_sd > 0.0);
                 let readings = if noisy { judging.readings } else { 1 };
                 let calibration = arm.rig.calibration().map_err(simulated)?;
-                let calibration = calibration.judged_at(&judging.positions, readings);
+                let calibration = calibration.with_contacts(&judging.positions, readings);
                 let is_network = matches!(estimator, Estimator::Network(_));
                 let patterns = if is_network { calibration.presses().len() } else { 0 };
                 let contacts = calibration.contacts().map_err(|error| simulated(error.into()))?;
@@ -266,9 +267,9 @@ impl LayoutRequest {
     }
 }
 
-fn request(arm: &Arm) -> Option<(AskedLayout, LayoutRequest)> {
+fn request(arm: &Arm) -> Option<(RequestedLayout, LayoutRequest)> {
     let asked = arm.layout.clone()?;
-    let setup = arm.rig.pressed_setup().ok()?;
+    let setup = arm.rig.training_setup().ok()?;
     let design = arm.rig.design.clone().or_else(|| SensorDesign::for_setup(&arm.rig.setup).ok())?;
     let method = asked.method;
     Some((asked, LayoutRequest { method, setup, design }))
@@ -287,8 +288,8 @@ pub struct TrainedSeed {
     pub evaluation: Evaluation,
 }
 
-impl From<Calibrated<Method>> for TrainedSeed {
-    fn from(Calibrated { seed, locator, mut evaluation }: Calibrated<Method>) -> Self {
+impl From<CalibrationTrial<Method>> for TrainedSeed {
+    fn from(CalibrationTrial { seed, locator, mut evaluation }: CalibrationTrial<Method>) -> Self {
         let training = locator.training_outcome();
         // Files of a study contain neither, and the results must not depend on whether a fit comes from one.
         for located in &mut evaluation.located {
@@ -300,7 +301,7 @@ impl From<Calibrated<Method>> for TrainedSeed {
 
 /// Fitted seed with its arm.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Trained {
+pub struct ArmFit {
     /// Index of the arm.
     pub arm: usize,
     /// Fit.
@@ -318,11 +319,12 @@ pub struct ArmOutcome {
 
 impl ArmOutcome {
     /// Quantiles over the seeds of the mean figure at each x, m.
-    pub fn by_position(&self, figure: impl Fn(&Located) -> f64) -> Vec<(f64, Quantiles)> {
+    pub fn by_position(&self, figure: impl Fn(&EvaluatedContact) -> f64) -> Vec<(f64, Quantiles)> {
         let means = |fit: &TrainedSeed| -> Vec<(f64, f64)> {
             let positions = fit.evaluation.located.chunk_by(|a, b| a.truth == b.truth);
-            let mean =
-                |readings: &[Located]| readings.iter().map(&figure).sum::<f64>() / readings.len() as f64;
+            let mean = |readings: &[EvaluatedContact]| {
+                readings.iter().map(&figure).sum::<f64>() / readings.len() as f64
+            };
             positions.map(|readings| (readings[0].truth.x_m, mean(readings))).collect()
         };
         let seeds: Vec<Vec<(f64, f64)>> = self.fits.iter().map(means).collect();
@@ -343,7 +345,7 @@ pub struct RunOptions {
 }
 
 /// Callback for fitted seeds; several threads call it at once.
-pub type OnTrained<'a> = dyn Fn(&Trained) + Sync + 'a;
+pub type FitCallback<'a> = dyn Fn(&ArmFit) + Sync + 'a;
 
 impl PreparedStudy {
     /// Number of parallel networks; blocks should be multiples.
@@ -358,7 +360,7 @@ impl PreparedStudy {
     }
 
     /// Lists the unfinished tasks in the order of [`PreparedStudy::tasks`], in blocks of successive seeds.
-    pub fn tasks_left(&self, seeds: u64, block: u64, done: &[Trained]) -> Vec<Task> {
+    pub fn tasks_left(&self, seeds: u64, block: u64, done: &[ArmFit]) -> Vec<Task> {
         let done: HashSet<(usize, u64)> = done.iter().map(|t| (t.arm, t.fit.seed)).collect();
         let mut left: Vec<Task> = Vec::new();
         for arm in self.arms_by_cost() {
@@ -382,8 +384,8 @@ impl PreparedStudy {
     pub fn run(
         &self,
         options: RunOptions,
-        mut done: Vec<Trained>,
-        on_trained: &OnTrained,
+        mut done: Vec<ArmFit>,
+        on_trained: &FitCallback,
         watch: Watch,
     ) -> Result<Vec<ArmOutcome>, StudyRunError> {
         let tasks = self.tasks(options.seeds, self.lanes());
@@ -398,11 +400,11 @@ impl PreparedStudy {
     pub fn fit_tasks(
         &self,
         tasks: &[Task],
-        done: &[Trained],
+        done: &[ArmFit],
         threads: usize,
-        on_trained: &OnTrained,
+        on_trained: &FitCallback,
         watch: Watch,
-    ) -> Result<Vec<Trained>, StudyRunError> {
+    ) -> Result<Vec<ArmFit>, StudyRunError> {
         let work = self.work(tasks, done)?;
         let finished = Mutex::new(Vec::new());
         let failed = Mutex::new(None);
@@ -435,7 +437,7 @@ impl PreparedStudy {
         }
     }
 
-    fn work(&self, tasks: &[Task], done: &[Trained]) -> Result<Vec<ArmWork>, StudyRunError> {
+    fn work(&self, tasks: &[Task], done: &[ArmFit]) -> Result<Vec<ArmWork>, StudyRunError> {
         let mut taken: HashSet<(usize, u64)> = done.iter().map(|t| (t.arm, t.fit.seed)).collect();
         let mut seeds = vec![Vec::new(); self.arms.len()];
         for task in tasks {
@@ -453,7 +455,7 @@ impl PreparedStudy {
     }
 
     /// Sorts fits with seeds below `seeds` into outcomes.
-    pub fn by_arm(&self, finished: Vec<Trained>, seeds: u64) -> Vec<ArmOutcome> {
+    pub fn by_arm(&self, finished: Vec<ArmFit>, seeds: u64) -> Vec<ArmOutcome> {
         let mut outcomes: Vec<ArmOutcome> = self
             .study
             .arms
@@ -481,8 +483,8 @@ struct Queue<'a> {
     study: &'a PreparedStudy,
     arm: usize,
     work: &'a [ArmWork],
-    on_trained: &'a OnTrained<'a>,
-    finished: &'a Mutex<Vec<Trained>>,
+    on_trained: &'a FitCallback<'a>,
+    finished: &'a Mutex<Vec<ArmFit>>,
 }
 
 impl Queue<'_> {
@@ -500,12 +502,12 @@ impl Queue<'_> {
             watch.round()?;
             let fit = calibration.run(&arm.rig.estimator, seed, watch);
             let fit = fit.map_err(|error| unfitted(&arm.name, error))?;
-            self.finish(Trained { arm: self.arm, fit: fit.into() });
+            self.finish(ArmFit { arm: self.arm, fit: fit.into() });
         }
         Ok(())
     }
 
-    fn finish(&self, trained: Trained) {
+    fn finish(&self, trained: ArmFit) {
         (self.on_trained)(&trained);
         lock(self.finished).push(trained);
     }
@@ -531,7 +533,7 @@ impl SeedQueue<Locator> for Queue<'_> {
 
     fn fitted(&mut self, seed: u64, locator: Locator) {
         // A locator that the study fitted has the study's channels.
-        if let Some(trained) = self.study.judge(self.arm, seed, locator) {
+        if let Some(trained) = self.study.evaluate(self.arm, seed, locator) {
             self.finish(trained);
         }
     }

@@ -91,7 +91,7 @@ fn locators_come_to_their_arms_limit() {
 }
 
 #[test]
-fn threads_change_nothing_and_seeds_do() {
+fn results_depend_on_seeds_and_not_on_threads() {
     let prepared = prepare(beam(THREE));
     let (one, three) = (run(&prepared, 3, 1), run(&prepared, 3, 3));
     assert_eq!(one, three);
@@ -103,10 +103,10 @@ fn a_figure_spreads_over_the_seeds_position_by_position() {
     let prepared = prepare(beam(THREE));
     let outcome = &run(&prepared, 3, 2)[1];
     let along = outcome.by_position(|located| located.error_m());
-    let positions = &prepared.judging().positions;
+    let positions = &prepared.evaluation_settings().positions;
     assert!(along.iter().map(|(x_m, _)| *x_m).eq(positions.iter().map(|position| position.x_m)));
     let mean_at_first = |fit: &TrainedSeed| {
-        let readings = prepared.judging().readings;
+        let readings = prepared.evaluation_settings().readings;
         let first = &fit.evaluation.located[..readings];
         first.iter().map(|located| located.error_m()).sum::<f64>() / readings as f64
     };
@@ -157,7 +157,7 @@ fn a_layout_that_cannot_be_had_is_refused_with_its_arm_and_place() {
 }
 
 #[test]
-fn what_cannot_be_fitted_is_an_error_that_names_the_arm() {
+fn unfittable_arm_is_named_in_the_error() {
     let few = beam(
         "[[arm]]\nname = \"few\"\ntraining = { count = 1, force = \"3 N\" }\nestimator = { kind = \"gaussian-process\" }",
     );
@@ -168,7 +168,7 @@ fn what_cannot_be_fitted_is_an_error_that_names_the_arm() {
 }
 
 #[test]
-fn errors_are_told_apart_between_the_training_positions_and_beyond() {
+fn errors_inside_and_outside_the_training_span_are_separate() {
     let text = paper::STUDY_TOML.replace("max_epochs = 1_000_000", "max_epochs = 300");
     let (head, _) = text.split_once("[[arm]]").unwrap();
     let head = head.replace("portions =", "training_span = true\nportions =");

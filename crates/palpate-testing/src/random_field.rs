@@ -52,7 +52,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reading_of_zero_adds_nothing() {
+    fn zero_reading_adds_zero() {
         let reading =
             |_: usize, column: usize| if column == 0 { vec![0.0; 2] } else { vec![1.0, column as f64] };
         let [length, _] = curvatures(1, 3, reading);

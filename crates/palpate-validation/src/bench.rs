@@ -99,7 +99,7 @@ impl Bench<'_> {
             Knowledge::Measured => {
                 let places = training.positions(setup.surface().extent())?;
                 let (pressed, presses) =
-                    (setup.pressed_by(&training)?, in_turn(&places, force_n, self.forces.pressed));
+                    (setup.with_training_force(&training)?, in_turn(&places, force_n, self.forces.pressed));
                 let (repeats, placement_sd_m) = (training.repeats, training.placement_sd_m);
                 simulate_presses_watched(&pressed, &presses, repeats, placement_sd_m, seed, Watch::NONE)?
             }
@@ -227,7 +227,7 @@ impl Recordings {
     /// untouched rows, where there is one.
     fn light_touches(&self, locator: &Locator) -> Result<Recording> {
         let limit = self.used.cramer_rao_bound()?;
-        let touch = locator.beyond_scatter(Influence::default().lightest_touch(&limit));
+        let touch = locator.add_scatter(Influence::default().lightest_touch(&limit));
         let light = self.places.iter().step_by(LIGHT_EACH).filter_map(|position| {
             let [_, surely_n] = touch.forces_at(*position);
             Some(Contact { position: *position, force_n: LIGHT * surely_n? })

@@ -236,7 +236,7 @@ fn track(locator: &Locator, config: TrackerConfig, readings: &Readings) -> Resul
     let (mut tracked, mut located, mut covered, mut error_mm) = (0, 0, 0, 0.0);
     let mut released = tared.len();
     for (i, reading) in tared.iter().enumerate() {
-        let track = tracker.follow(i as f64 / RATE_HZ, reading)?;
+        let track = tracker.update(i as f64 / RATE_HZ, reading)?;
         let first = track.contacts.first();
         if let (Some(first), true) = (first, counted.contains(&i)) {
             let x_m = truth.position.x_m;

@@ -130,7 +130,7 @@ impl Case {
         let mut locator = influence.fit_beam(FitTask::new(&assumed, &presses))?;
         if let Sensors::Disabled(channel) = self.sensors {
             ensure!(locator.leave_out(channel), "sensor {channel} cannot be disabled");
-            setup.set_dead(channel, true);
+            setup.set_disabled(channel, true);
         }
         let bounds = setup.cramer_rao_bound()?;
         for x_mm in (5..=395).step_by(EVERY_MM) {

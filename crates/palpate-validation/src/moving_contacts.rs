@@ -7,7 +7,7 @@ use crate::table::{Column, Figure, Goal, Row, Table};
 use anyhow::{Context, Result};
 use palpate::estimators::estimator::{Swing, Track};
 use palpate::estimators::simulate::{MovingContacts, simulate_moving};
-use palpate::estimators::track_errors::{SPEED_RATIOS, TrackErrors, follow};
+use palpate::estimators::track_errors::{SPEED_RATIOS, TrackErrors, track_recording};
 use palpate::prelude::{Fit, Rig, TrackerConfig};
 
 /// The experiment.
@@ -197,7 +197,7 @@ impl Bench {
             let truths = recording.truths();
             let errors_of = |tracks: &[Track]| TrackErrors::new(tracks, &truths, extent);
             for dynamics in speed.dynamics(self.surface) {
-                let tracks = follow(&locator, dynamics.config(&moving)?, &recording)?;
+                let tracks = track_recording(&locator, dynamics.config(&moving)?, &recording)?;
                 errors.push(errors_of(&tracks.filtered).zip(errors_of(&tracks.smoothed)));
             }
         }

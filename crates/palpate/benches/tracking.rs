@@ -58,7 +58,7 @@ fn readings_per_s(locator: &Locator, config: TrackerConfig, timed: &TimedRecordi
             let mut tracker = Tracker::new(tracking.likelihood(), config);
             let start = ThreadTime::now();
             for (row, time_s) in rows.iter().zip(&timed.times_s) {
-                std::hint::black_box(tracker.follow(*time_s, &row.reading).expect("times rise"));
+                std::hint::black_box(tracker.update(*time_s, &row.reading).expect("times rise"));
             }
             rows.len() as f64 / start.elapsed().as_secs_f64()
         })

@@ -20,6 +20,6 @@ pub fn gain() -> Result<f64, Box<dyn std::error::Error>> {
         println!("{}: {:.0} mm", sensor.name, 1e3 * sensor.position.x_m);
     }
     let limit =
-        |designed: &Designed| designed.assessment.mean_limit_m.ok_or("some contact is unidentifiable");
+        |designed: &AssessedLayout| designed.assessment.mean_limit_m.ok_or("some contact is unidentifiable");
     Ok(1.0 - limit(&best)? / limit(&even)?)
 }

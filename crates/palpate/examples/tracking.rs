@@ -20,7 +20,7 @@ pub fn mean_error_m() -> Result<f64, Box<dyn std::error::Error>> {
     let mut tracker = Tracker::new(tracking.likelihood(), config);
     let (mut sum_m, mut tracked) = (0.0, 0);
     for (i, row) in simulate_at(&setup, &path, 1, 9)?.rows.iter().enumerate() {
-        if let Some(contact) = tracker.follow(1e-3 * i as f64, &row.reading)?.contacts.first() {
+        if let Some(contact) = tracker.update(1e-3 * i as f64, &row.reading)?.contacts.first() {
             sum_m += (contact.x_m - row.position.x_m).abs();
             tracked += 1;
         }

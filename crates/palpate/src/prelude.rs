@@ -1,7 +1,7 @@
 //! Common items: `use palpate::prelude::*;`
 
 pub use palpate_design::positions::{Advice, PositionDesign, PositionProblem, best_placed, next_press};
-pub use palpate_design::sensors::{ContactPrior, Designed, SensorDesign, SensorProblem, Sites};
+pub use palpate_design::sensors::{AssessedLayout, ContactPrior, SensorDesign, SensorProblem, Sites};
 pub use palpate_estimators::arrangement::{Arrangement, Training, all_over};
 pub use palpate_estimators::centroid::Centroid;
 pub use palpate_estimators::closed_form::ClosedForm;

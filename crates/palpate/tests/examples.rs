@@ -20,7 +20,7 @@ mod tracking;
 mod training_positions;
 
 #[test]
-fn the_papers_beam_is_located_to_what_an_unknown_force_allows() {
+fn papers_beam_reaches_the_bound_of_an_unknown_force() {
     let error_m = beam::error_m().unwrap();
     assert!((error_m - 1.882e-3).abs() < 1e-5, "{error_m}");
 }
@@ -32,7 +32,7 @@ fn a_recording_of_ones_own_is_located_between_its_positions() {
 }
 
 #[test]
-fn a_plate_tells_the_force() {
+fn plate_estimates_the_force() {
     let force_n = plate::force_n().unwrap();
     assert!((force_n - 4.174).abs() < 1e-3, "{force_n}");
 }
@@ -50,7 +50,7 @@ fn a_track_is_within_half_a_millimetre() {
 }
 
 #[test]
-fn a_spread_load_is_told_to_a_few_percent() {
+fn distributed_load_is_estimated_within_a_few_percent() {
     let total_n = load_profile::total_n().unwrap();
     assert!((total_n - 3.0).abs() < 0.1, "{total_n}");
 }
@@ -62,7 +62,7 @@ fn sensors_are_placed_better_than_evenly() {
 }
 
 #[test]
-fn the_next_press_is_where_nobody_pressed() {
+fn next_press_is_at_a_new_position() {
     let next_m = training_positions::next_m().unwrap();
     assert!(next_m > 0.22, "{next_m}");
 }

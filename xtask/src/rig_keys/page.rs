@@ -199,7 +199,7 @@ impl<'a> Page<'a> {
             "Grid" => "list: columns and rows".to_owned(),
             "Span" => "span of time, as in `\"0 s..10 s\"`, `\"95 s..\"` or `\"..2 min\"`".to_owned(),
             "Point" => "length; on a plane a list: along and across".to_owned(),
-            "Written" => "quantity that the sensors measure".to_owned(),
+            "RawQuantity" => "quantity that the sensors measure".to_owned(),
             "ShareOrQuantity" => "share of the range, or quantity that the sensors measure".to_owned(),
             "bool" => "`true` or `false`".to_owned(),
             "String" => "text".to_owned(),

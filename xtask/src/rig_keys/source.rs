@@ -10,7 +10,7 @@ use syn::punctuated::Punctuated;
 use syn::spanned::Spanned;
 use syn::{Attribute, Expr, Fields, ImplItem, Lit, Meta, MetaList, Token, parenthesized, token};
 
-use crate::rust::{self, UsedPath, Uses};
+use crate::rust::{self, FileReferences, UsedPath};
 
 #[derive(Clone, Debug)]
 pub struct Item {
@@ -206,7 +206,7 @@ impl Source {
                 _ => {}
             }
         }
-        Self { paths: Uses::of(file).paths, constants, bounds }
+        Self { paths: FileReferences::of(file).paths, constants, bounds }
     }
 }
 

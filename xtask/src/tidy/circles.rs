@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use super::Finding;
 use super::project::{File, Project};
-use crate::rust::{self, UsedPath, Uses};
+use crate::rust::{self, FileReferences, UsedPath};
 
 type Name = Vec<String>;
 
@@ -54,7 +54,7 @@ fn modules<'a>(project: &'a Project, root: &str) -> Result<Modules<'a>, Finding>
     while let Some((name, folder, file)) = open.pop() {
         let parsed = rust::parse(&file.text())
             .map_err(|error| Finding::new(&file.path, 1, format!("cannot read this file: {error}")))?;
-        let Uses { paths, modules: declared } = Uses::of(&parsed);
+        let FileReferences { paths, modules: declared } = FileReferences::of(&parsed);
         for child in declared {
             let inside = format!("{folder}/{child}");
             let files = [format!("{inside}.rs"), format!("{inside}/mod.rs")];

@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn dead_links_and_missing_examples_are_found() {
+    fn broken_links_and_missing_examples_are_found() {
         let text = "[book](docs/book/begin.md#top)\n`palpate fit examples/none.toml`\n[out]: ../shared/x.md";
         let found = messages("README.md", text);
         assert_eq!(

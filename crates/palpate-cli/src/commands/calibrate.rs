@@ -2,7 +2,7 @@
 
 use super::jog::{Jog, JogEnd};
 use super::operator::{self, place};
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::json::object;
 use crate::progress::{self, Observer};
 use crate::remark::{alert, remark};
@@ -13,8 +13,8 @@ use palpate_estimators::estimator::Locator;
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::recording::{Recording, Row, comment_with_placement};
 use palpate_live::calibration::{
-    self, Assessment, Calibration, CalibrationError, Check, DepthKnowledge, Journal, JournalError, Machine,
-    MachineError, MachineNote, Note, Press, Statements, Waiting, Weights,
+    self, Assessment, AwaitedStep, Calibration, CalibrationError, Check, DepthKnowledge, Journal,
+    JournalError, Machine, MachineError, MachineNote, Note, Press, Statements, Weights,
 };
 use palpate_live::input::Input;
 use palpate_live::pipeline::WAITING;
@@ -175,14 +175,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (before, in_file_m) = rows_before(arguments, &rig, depths)?;
     let stated = arguments.operator.statements();
     let known = match &stage {
-        None => stated.or_known(&rig, arguments.force, in_file_m, &before),
+        None => stated.with_known_values(&rig, arguments.force, in_file_m, &before),
         // The rig's placement error is that of a person.
         Some(_) => stated,
     };
     let depths_m = stage.as_ref().map_or_else(Vec::new, |stage| stage.depths_m.clone());
     let to_come = |statements: &Statements, rows: &[Row]| {
         calibration::plan(&rig, statements.weights(arguments.force), &depths_m, rows)
-            .map_err(|error| Complaint::about(&arguments.rig, error))
+            .map_err(|error| UserError::for_path(&arguments.rig, error))
     };
     let is_by_hand = stage.is_none() && !to_come(&known, &before)?.is_empty();
     let keys = (arguments.from != SourceUrl::Stdin).then(keys);
@@ -198,14 +198,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let rig = statements.applied_to(&rig, arguments.force);
     let plan = to_come(&statements, &before)?;
-    let comment = comment_with_placement(&pressed_for(&arguments.rig), statements.placement_sd_m);
+    let comment = comment_with_placement(&journal_heading(&arguments.rig), statements.placement_sd_m);
     let bench = Bench { arguments, rig: &rig, keys: keys.as_ref(), clock };
     if let Some(press) = plan.first() {
         if let Some(force_n) = statements.single_weight_n(&rig, arguments.force).filter(|_| is_by_hand) {
             alert!("{}", operator::single_weight(force_n));
         }
         let journal = Journal::new(&rig.setup, &arguments.presses, comment.clone(), before, depths)
-            .map_err(|error| about_journal(&arguments.rig, &error))?;
+            .map_err(|error| journal_failure(&arguments.rig, &error))?;
         let extent = rig.setup.surface().extent();
         alert!("{} presses to go; the first at {}", plan.len(), place(*press, extent));
         let calibration = bench.calibration(stage.as_ref(), plan, journal)?;
@@ -214,7 +214,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let (locator, recording) = finish(arguments, &rig, &out)?;
     let weights = statements.weights(arguments.force);
-    let asks = is_by_hand && !arguments.check && bench.keys.is_some_and(operator::wants_check);
+    let asks = is_by_hand && !arguments.check && bench.keys.is_some_and(operator::asks_for_check);
     if arguments.check || asks {
         bench.check(&locator, &recording.rows, weights, comment, statements.placement_sd_m, stage)?;
     }
@@ -231,7 +231,7 @@ pub fn stage(
         return Ok(None);
     }
     let Some(stage) = &rig.stage else {
-        let complaint = Complaint::about(path, "--stage needs the rig's section [stage]");
+        let complaint = UserError::for_path(path, "--stage needs the rig's section [stage]");
         return Err(complaint
             .help("docs/how-to/press-with-a-machine.md describes it; `origin`, `touch` and `depths` are required")
             .into());
@@ -242,7 +242,7 @@ pub fn stage(
         } else {
             "presses of several depths have several forces"
         };
-        return Err(Complaint::new(format!("--force does not go with the rig's [stage]: {why}"))
+        return Err(UserError::new(format!("--force does not go with the rig's [stage]: {why}"))
             .help("leave --force out")
             .into());
     }
@@ -256,22 +256,22 @@ fn rows_before(
 ) -> Result<(Vec<Row>, Option<f64>), Failure> {
     let path = &arguments.presses;
     if path.exists() && !arguments.resume {
-        let complaint = Complaint::new(format!("{} exists already", path.display()));
+        let complaint = UserError::new(format!("{} exists already", path.display()));
         return Err(complaint
             .help("--resume continues with its presses; another name starts a new calibration")
             .into());
     }
-    pressed_before(&arguments.rig, rig, path, depths)
+    load_presses(&arguments.rig, rig, path, depths)
 }
 
 /// Returns the rows and the placement of a presses file; no rows without a file.
-pub fn pressed_before(
+pub fn load_presses(
     rig_path: &Path,
     rig: &Rig,
     path: &Path,
     depths: DepthKnowledge,
 ) -> Result<(Vec<Row>, Option<f64>), Failure> {
-    let columns = Journal::columns(&rig.setup, depths).map_err(|error| about_journal(rig_path, &error))?;
+    let columns = Journal::columns(&rig.setup, depths).map_err(|error| journal_failure(rig_path, &error))?;
     match path.exists() {
         true => {
             let recording = input::read_recording_as(&rig.setup, path, &columns)?;
@@ -281,19 +281,19 @@ pub fn pressed_before(
     }
 }
 
-pub fn pressed_for(rig: &Path) -> String {
+pub fn journal_heading(rig: &Path) -> String {
     format!("palpate {}, pressed for {}", env!("CARGO_PKG_VERSION"), rig.display())
 }
 
-pub fn about_journal(rig: &Path, error: &JournalError) -> Failure {
+pub fn journal_failure(rig: &Path, error: &JournalError) -> Failure {
     let complaint = match error {
-        JournalError::Nuisance { .. } | JournalError::Numbered => Complaint::about(rig, error),
-        _ => Complaint::new(error),
+        JournalError::Nuisance { .. } | JournalError::Numbered => UserError::for_path(rig, error),
+        _ => UserError::new(error),
     };
     complaint.help(error.help()).into()
 }
 
-type Replan<'a> = &'a dyn Fn(&[Row]) -> Result<Vec<Press>, Complaint>;
+type Replan<'a> = &'a dyn Fn(&[Row]) -> Result<Vec<Press>, UserError>;
 
 struct Bench<'a> {
     arguments: &'a Arguments,
@@ -307,7 +307,7 @@ impl Bench<'_> {
         let from = &self.arguments.from;
         let (to, inputs) = sync_channel(WAITING);
         let source = Source::open(from, Path::new("."), self.clock, to)
-            .map_err(|error| Complaint::new(format!("--from {from}: {error}")))?;
+            .map_err(|error| UserError::new(format!("--from {from}: {error}")))?;
         Ok((source, inputs))
     }
 
@@ -316,13 +316,13 @@ impl Bench<'_> {
         let Self { arguments, rig, clock, .. } = self;
         let (Some(url), Some(keys)) = (arguments.machine(), self.keys) else {
             let complaint =
-                Complaint::new("--jog needs the keyboard, and --from - takes the readings from it");
+                UserError::new("--jog needs the keyboard, and --from - takes the readings from it");
             return Err(complaint.help("give the readings by another source").into());
         };
         // This calibration has no presses, so it writes no file.
         let journal =
             Journal::new(&rig.setup, &arguments.presses, String::new(), Vec::new(), DepthKnowledge::Unknown)
-                .map_err(|error| about_journal(&arguments.rig, &error))?;
+                .map_err(|error| journal_failure(&arguments.rig, &error))?;
         let calibration = self.calibration(Some(stage), Vec::new(), journal)?;
         let (_source, inputs) = self.open_source()?;
         let thread = open_stage(url, stage.clone(), *clock)?;
@@ -348,7 +348,7 @@ impl Bench<'_> {
     ) -> Result<Calibration, Failure> {
         let from = &self.arguments.from;
         Calibration::new(&self.rig.setup, stage, from.columns(), plan, journal)
-            .map_err(|error| Complaint::new(format!("--from {from}: {error}")).into())
+            .map_err(|error| UserError::new(format!("--from {from}: {error}")).into())
     }
 
     fn check(
@@ -364,12 +364,12 @@ impl Bench<'_> {
         let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
         let plan = calibration::check_presses(rig, rows, weights, depths_m);
         if plan.is_empty() {
-            return Err(Complaint::new("no check position lies between those of the calibration").into());
+            return Err(UserError::new("no check position lies between those of the calibration").into());
         }
         let path = calibration::check_path(&arguments.presses);
         let depths = DepthKnowledge::for_stage(stage.as_ref());
         let journal = Journal::new(&rig.setup, &path, comment, Vec::new(), depths)
-            .map_err(|error| about_journal(&arguments.rig, &error))?;
+            .map_err(|error| journal_failure(&arguments.rig, &error))?;
         alert!("check at {} fresh places; the presses are in {}", plan.len(), path.display());
         let calibration = self.calibration(stage.as_ref(), plan, journal)?;
         self.press_all(stage, calibration, None)?;
@@ -378,11 +378,11 @@ impl Bench<'_> {
             return Ok(());
         }
         let recording = input::read_recording(&rig.setup, &path)?;
-        let check = Check::new(locator, &recording).map_err(Complaint::new)?;
+        let check = Check::new(locator, &recording).map_err(UserError::new)?;
         if let (true, Some(check)) = (arguments.json, &check) {
-            return output::say_json_line(&object! { "check": operator::check_json(check) });
+            return output::print_json_line(&object! { "check": operator::check_json(check) });
         }
-        operator::say_check(check.as_ref(), placement_sd_m, rig.setup.surface().extent())
+        operator::print_check(check.as_ref(), placement_sd_m, rig.setup.surface().extent())
     }
 
     /// Guides the presses of a plan. With `replan`, the operator can delete and repeat a press.
@@ -401,7 +401,7 @@ impl Bench<'_> {
             operator::ask_for(&calibration, extent);
         }
         let mut ended = false;
-        while calibration.guide().waiting() != Waiting::Nothing && !ended {
+        while calibration.guide().awaited_step() != AwaitedStep::Nothing && !ended {
             if progress::interrupted() {
                 if let Some(machine) = &mut machine {
                     machine.stop_by_hand().map_err(|error| machine_ended(arguments, &calibration, &error))?;
@@ -419,7 +419,7 @@ impl Bench<'_> {
                 Err(RecvTimeoutError::Disconnected) => ended = true,
             }
             ended |= notes.contains(&Note::Ended);
-            operator::say(&notes, &calibration, machine.is_none().then_some(extent));
+            operator::print_notes(&notes, &calibration, machine.is_none().then_some(extent));
             let key = keys.as_ref().and_then(|keys| keys.try_recv().ok());
             match (&mut machine, key) {
                 (None, Some(key)) => press_key(&key, arguments, &mut calibration, extent, replan)?,
@@ -433,15 +433,15 @@ impl Bench<'_> {
         for (cause, count) in calibration.bad_frames() {
             alert!("{count} frames were not readings: {}", cause.describe());
         }
-        if calibration.guide().waiting() != Waiting::Nothing {
+        if calibration.guide().awaited_step() != AwaitedStep::Nothing {
             if let Some(machine) = machine {
                 machine.finish().map_err(|error| machine_ended(arguments, &calibration, &error))?;
             }
             let cause = calibration.fault().unwrap_or("the source ended before all was pressed".to_owned());
-            return Err(Failure::DataLost(format!("{cause}; {}", goes_on(arguments, &calibration))));
+            return Err(Failure::DataLost(format!("{cause}; {}", resumption_text(arguments, &calibration))));
         }
         if let Some(fault) = calibration.fault().filter(|_| calibration.readings() == 0) {
-            return Err(Failure::DataLost(format!("{fault}; {}", goes_on(arguments, &calibration))));
+            return Err(Failure::DataLost(format!("{fault}; {}", resumption_text(arguments, &calibration))));
         }
         match machine {
             Some(machine) => machine.finish().map_err(|error| machine_ended(arguments, &calibration, &error)),
@@ -466,13 +466,13 @@ fn open_stage(url: &StageUrl, stage: Stage, clock: HostClock) -> Result<StageThr
     let stop = Arc::default();
     // A stopped machine lifts its finger.
     progress::finish_after_signal();
-    progress::set_at_signal(&stop).map_err(Complaint::new)?;
+    progress::set_at_signal(&stop).map_err(UserError::new)?;
     let thread = StageThread::open(url, stage, stop, clock).map_err(|error| {
         if progress::interrupted() {
             return Failure::Interrupted("stopped before anything moved".to_owned());
         }
         let error = MachineError::from(error);
-        Complaint::new(format!("--stage {url}: {error}")).help(error.help()).into()
+        UserError::new(format!("--stage {url}: {error}")).help(error.help()).into()
     })?;
     alert!(
         "a machine of {} firmware at {url}; Enter stops it: {}",
@@ -486,7 +486,7 @@ fn dry_run(arguments: &Arguments, rig: &Rig, stage: Stage, clock: HostClock) -> 
     let Some(url) = arguments.machine() else { return Ok(()) };
     let weights = arguments.operator.statements().weights(arguments.force);
     let plan = calibration::plan(rig, weights, &stage.depths_m, &[])
-        .map_err(|error| Complaint::about(&arguments.rig, error))?;
+        .map_err(|error| UserError::for_path(&arguments.rig, error))?;
     let positions = calibration::dry_run(&plan);
     let keys = keys();
     let mut thread = open_stage(url, stage, clock)?;
@@ -502,9 +502,9 @@ fn dry_run(arguments: &Arguments, rig: &Rig, stage: Stage, clock: HostClock) -> 
     }
     thread.close();
     if arguments.json {
-        return output::say_json_line(&object! { "dry_run_positions": positions.len() });
+        return output::print_json_line(&object! { "dry_run_positions": positions.len() });
     }
-    output::say(format!(
+    output::print_line(format!(
         "dry run: {} positions reached at the height of travel, none pressed",
         positions.len()
     ))
@@ -535,7 +535,7 @@ fn step(
     if key.is_some() {
         return machine.stop_by_hand();
     }
-    machine.heed(notes)?;
+    machine.stop_on_notes(notes)?;
     match machine.step(now, calibration)? {
         Some(MachineNote::Homing) => alert!("the machine searches for its end stops"),
         Some(MachineNote::Unseen) => alert!("press excluded: it changed no reading"),
@@ -547,7 +547,7 @@ fn step(
 }
 
 fn machine_ended(arguments: &Arguments, calibration: &Calibration, error: &MachineError) -> Failure {
-    machine_failure(error, &format!("; {}", goes_on(arguments, calibration)))
+    machine_failure(error, &format!("; {}", resumption_text(arguments, calibration)))
 }
 
 fn machine_failure(error: &MachineError, more: &str) -> Failure {
@@ -561,9 +561,9 @@ fn machine_failure(error: &MachineError, more: &str) -> Failure {
 
 fn cannot_go_on(arguments: &Arguments, calibration: &Calibration, error: CalibrationError) -> Failure {
     match error {
-        CalibrationError::Journal(error) => about_journal(&arguments.rig, &error),
+        CalibrationError::Journal(error) => journal_failure(&arguments.rig, &error),
         CalibrationError::LoadCell { .. } => {
-            Failure::GoalMissed(format!("{error}; {}", goes_on(arguments, calibration)))
+            Failure::GoalMissed(format!("{error}; {}", resumption_text(arguments, calibration)))
         }
     }
 }
@@ -600,7 +600,7 @@ fn press_key(
     extent: Extent,
     replan: Option<Replan>,
 ) -> Result<(), Failure> {
-    let about = |error: &JournalError| about_journal(&arguments.rig, error);
+    let about = |error: &JournalError| journal_failure(&arguments.rig, error);
     match (key.trim(), replan) {
         ("r", _) => {
             if !calibration.redo().map_err(|error| about(&error))? {
@@ -633,12 +633,14 @@ fn press_key(
 
 fn stopped(arguments: &Arguments, calibration: &Calibration) -> Failure {
     match calibration.fault() {
-        Some(fault) => Failure::DataLost(format!("stopped; {fault}; {}", goes_on(arguments, calibration))),
-        None => Failure::Interrupted(format!("stopped; {}", goes_on(arguments, calibration))),
+        Some(fault) => {
+            Failure::DataLost(format!("stopped; {fault}; {}", resumption_text(arguments, calibration)))
+        }
+        None => Failure::Interrupted(format!("stopped; {}", resumption_text(arguments, calibration))),
     }
 }
 
-fn goes_on(arguments: &Arguments, calibration: &Calibration) -> String {
+fn resumption_text(arguments: &Arguments, calibration: &Calibration) -> String {
     let presses = calibration.journal().presses();
     if presses == 0 {
         return "no press is recorded".to_owned();
@@ -669,7 +671,7 @@ fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(Locator, Re
     let observer = Observer::of_rounds(rig.estimator.most_rounds());
     let locator =
         observer.watch(|watch| rig.estimator.fit_task(task.watch(watch))).map_err(|error| failed(&error))?;
-    out.write(locator.to_json().map_err(Complaint::new)?.as_bytes())?;
+    out.write(locator.to_json().map_err(UserError::new)?.as_bytes())?;
     let presses = recording.touched().rows.len();
     let assess = || {
         let assessment = observer.watch(|watch| Assessment::new(rig, &recording, arguments.seed, watch));
@@ -677,24 +679,33 @@ fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(Locator, Re
             .map_err(|Cancelled| Failure::Interrupted("stopped before its error was estimated".to_owned()))
     };
     if arguments.json {
-        output::say_json_line(&result(arguments, &locator, presses, &assess()?))?;
+        output::print_json_line(&result(arguments, &locator, presses, &assess()?))?;
         return Ok((locator, recording));
     }
-    output::say(format!("{} fitted to {presses} presses: {}", locator.kind(), arguments.out.display()))?;
+    output::print_line(format!(
+        "{} fitted to {presses} presses: {}",
+        locator.kind(),
+        arguments.out.display()
+    ))?;
     let checked = description::interval_check(locator.interval_check.as_ref());
-    checked.into_iter().try_for_each(output::say)?;
+    checked.into_iter().try_for_each(output::print_line)?;
     let assessment = assess()?;
     if let Some(held_out) = assessment.held_out {
         let (median, mean) = (format_length_mm(held_out.median_m), format_length_mm(held_out.mean_m));
         let folds = held_out.folds;
-        output::say(format!("error at held-out positions ({folds} folds): median {median}, mean {mean}"))?;
+        output::print_line(format!(
+            "error at held-out positions ({folds} folds): median {median}, mean {mean}"
+        ))?;
     }
     assessment.remarks.iter().for_each(|remark| remark!("{remark}"));
     match assessment.gain {
         Some(gain) if gain.is_enough() => {
-            output::say(format!("more presses would lower the error by less than {} %", gain.stop_percent))?;
+            output::print_line(format!(
+                "more presses would lower the error by less than {} %",
+                gain.stop_percent
+            ))?;
         }
-        Some(gain) => output::say(format!(
+        Some(gain) => output::print_line(format!(
             "unlimited further presses would lower the expected error by {:.0} %: `palpate design positions {} --data {}` proposes positions",
             gain.percent,
             arguments.rig.display(),

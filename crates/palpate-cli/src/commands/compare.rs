@@ -2,7 +2,7 @@
 
 use super::evaluate::ErrorFigures;
 use crate::cost::MemoryOption;
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::input::RecordingFiles;
 use crate::json::object;
 use crate::output::Table;
@@ -12,7 +12,7 @@ use crate::tare::{TareOption, tare_splits};
 use crate::target::{Inputs, TargetFolder};
 use crate::{input, output, progress, tables};
 use palpate_estimators::estimator::{
-    self, CompareOptions, Compared, Comparison, UnknownEstimator, contenders, select,
+    self, CompareOptions, Comparison, ComparisonResult, UnknownEstimator, contenders, select,
 };
 use palpate_estimators::evaluation::{Evaluation, ForceSummary, Split, limit_ratio, percentage_error};
 use palpate_mechanics::surface::Extent;
@@ -70,7 +70,7 @@ pub struct Arguments {
 }
 
 /// Kind of an unsuitable estimator, and the reason.
-type LeftOut = (&'static str, String);
+type OmittedEstimator = (&'static str, String);
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.tare.check_recorded(&arguments.files)?;
@@ -79,8 +79,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let folder = folder.map(|folder| TargetFolder::for_report(folder, &inputs)).transpose()?;
     let rig = input::read_rig(&arguments.rig)?;
     let Trials { data, source, how, trials } = trials(arguments, &rig)?;
-    let Compared { comparisons, left_out } = compare(arguments, &rig, &trials)?;
-    let readings: usize = trials.iter().map(|trial| trial.judged.rows.len()).sum();
+    let ComparisonResult { comparisons, omitted: left_out } = compare(arguments, &rig, &trials)?;
+    let readings: usize = trials.iter().map(|trial| trial.held_out.rows.len()).sum();
     if let Some(folder) = &folder {
         write_report(arguments, &rig, &how, &comparisons, &left_out, folder)?;
         let comment =
@@ -90,7 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     if arguments.json {
         let estimators = comparisons.iter().filter_map(|comparison| json_row(&rig, comparison, arguments));
-        return output::say_json(&object! {
+        return output::print_json(&object! {
             "palpate": env!("CARGO_PKG_VERSION"),
             "rig": arguments.rig.display().to_string(),
             "data": data,
@@ -104,12 +104,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "left_out": left_out.iter().map(|(name, why)| object! { "name": name, "why": why }).collect::<Vec<_>>(),
         });
     }
-    output::say(format!("{}: {how}; {readings} readings\n", arguments.rig.display()))?;
-    output::say(table(&rig, &comparisons, arguments))?;
+    output::print_line(format!("{}: {how}; {readings} readings\n", arguments.rig.display()))?;
+    output::print_line(table(&rig, &comparisons, arguments))?;
     for (name, why) in &left_out {
-        output::say(format!("\n{name} is skipped: {why}"))?;
+        output::print_line(format!("\n{name} is skipped: {why}"))?;
     }
-    output::say_report("\n", arguments.report.as_deref())
+    output::print_report_path("\n", arguments.report.as_deref())
 }
 
 fn write_report(
@@ -117,7 +117,7 @@ fn write_report(
     rig: &Rig,
     how: &str,
     comparisons: &[Comparison],
-    left_out: &[LeftOut],
+    left_out: &[OmittedEstimator],
     folder: &TargetFolder,
 ) -> Result<(), Failure> {
     let report = ComparisonReport {
@@ -125,7 +125,7 @@ fn write_report(
         setup: &rig.setup,
         trials: how,
         comparisons,
-        left_out,
+        omitted: left_out,
         tolerance_m: arguments.tolerance,
         seed: arguments.seed,
     };
@@ -135,7 +135,7 @@ fn write_report(
 fn errors_table(comment: &str, comparisons: &[Comparison], extent: Extent) -> CsvTable {
     let columns = [vec!["estimator"], tables::position_columns(extent), ERROR_COLUMNS.to_vec()].concat();
     let mut table = CsvTable::new(comment, columns);
-    for Comparison { estimator, tried } in comparisons {
+    for Comparison { estimator, timed: tried } in comparisons {
         for (position, evaluation) in tried.evaluation.by_position() {
             let position = tables::position_cells(position, extent);
             table.row(
@@ -149,12 +149,12 @@ fn errors_table(comment: &str, comparisons: &[Comparison], extent: Extent) -> Cs
 fn trials_table(comment: &str, comparisons: &[Comparison], trials: &[Split]) -> CsvTable {
     let columns = [vec!["estimator", "trial"], ERROR_COLUMNS.to_vec()].concat();
     let mut table = CsvTable::new(comment, columns);
-    for Comparison { estimator, tried } in comparisons {
+    for Comparison { estimator, timed: tried } in comparisons {
         let Evaluation { extent, located } = &tried.evaluation;
         let mut rest = located.as_slice();
         for (number, trial) in trials.iter().enumerate() {
             // The answers of all trials are concatenated.
-            let count = trial.judged.rows.iter().filter(|row| row.touches()).count();
+            let count = trial.held_out.rows.iter().filter(|row| row.touches()).count();
             let (own, others) = rest.split_at(count.min(rest.len()));
             rest = others;
             let evaluation = Evaluation { extent: *extent, located: own.to_vec() };
@@ -177,11 +177,11 @@ fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
         let (count, seed) = (u64::from(arguments.calibrations), arguments.seed);
         let trials = Observer::of_stages().watch(|watch| rig.trials_watched(count, seed, watch));
         let trials = trials.map_err(|error| {
-            let about = |error| Complaint::about(&arguments.rig, error);
+            let about = |error| UserError::for_path(&arguments.rig, error);
             Failure::of_work(error, |error| about(error).help("--data names a recording to compare on"))
         })?;
         let calibrations = arguments.calibrations;
-        let judged = trials.first().map_or(0, |trial| trial.judged.rows.len());
+        let judged = trials.first().map_or(0, |trial| trial.held_out.rows.len());
         let forces = match rig.setup.force_n() {
             Some(_) => "",
             None => " by the force of the presses, half and twice that in turn",
@@ -193,7 +193,7 @@ fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
         return Ok(Trials { data: "simulation".to_owned(), source: how.clone(), how, trials });
     };
     let recording = recording.in_order();
-    let mut trials = Split::by_folds(&recording, usize::from(arguments.folds)).map_err(Complaint::new)?;
+    let mut trials = Split::by_folds(&recording, usize::from(arguments.folds)).map_err(UserError::new)?;
     tare_splits(&arguments.tare, &rig.setup, &recording, &mut trials)?;
     let tared = arguments.tare.in_words();
     let cross_validated =
@@ -203,11 +203,11 @@ fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
     Ok(Trials { source, how: cross_validated(&data), data, trials })
 }
 
-fn compare(arguments: &Arguments, rig: &Rig, trials: &[Split]) -> Result<Compared, Failure> {
+fn compare(arguments: &Arguments, rig: &Rig, trials: &[Split]) -> Result<ComparisonResult, Failure> {
     let rows = trials.first().map_or(0, |trial| trial.training.rows.len());
     let contenders = contenders(&rig.setup, &rig.estimator, rows);
     let contenders = select(contenders, &arguments.only).map_err(|UnknownEstimator { name, known }| {
-        let complaint = Complaint::new(format!("--only {name}: no estimator of this kind suits the rig"));
+        let complaint = UserError::new(format!("--only {name}: no estimator of this kind suits the rig"));
         complaint.help(format!("it can be: {}", known.join(", ")))
     })?;
     // A single estimator is refused; among several it is omitted.
@@ -240,7 +240,7 @@ fn compare(arguments: &Arguments, rig: &Rig, trials: &[Split]) -> Result<Compare
 }
 
 fn json_row(rig: &Rig, comparison: &Comparison, arguments: &Arguments) -> Option<impl Serialize> {
-    let evaluation = &comparison.tried.evaluation;
+    let evaluation = &comparison.timed.evaluation;
     let summary = evaluation.summary(None)?;
     Some(object! {
         "name": comparison.estimator.name(),
@@ -252,18 +252,18 @@ fn json_row(rig: &Rig, comparison: &Comparison, arguments: &Arguments) -> Option
         "statuses_percent": tables::status_percents(evaluation),
         "force_errors_n": tables::force_errors(evaluation),
         "limit_ratio": limit_ratio(&rig.setup, evaluation),
-        "fit_seconds": comparison.tried.fit_seconds,
-        "locate_ns": comparison.tried.locate_ns,
+        "fit_seconds": comparison.timed.fit_seconds,
+        "locate_ns": comparison.timed.locate_ns,
     })
 }
 
 fn table(rig: &Rig, comparisons: &[Comparison], arguments: &Arguments) -> String {
     let rows = comparisons.iter().filter_map(|comparison| {
-        let evaluation = &comparison.tried.evaluation;
+        let evaluation = &comparison.timed.evaluation;
         Some((comparison, evaluation, evaluation.summary(None)?))
     });
     let or_dash = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
-    let has_forces = comparisons.iter().any(|of| of.tried.evaluation.force_summary().is_some());
+    let has_forces = comparisons.iter().any(|of| of.timed.evaluation.force_summary().is_some());
     let table = Table::from_rows(rows)
         .column("error, mm (% of length)", |(comparison, ..)| comparison.estimator.name().to_owned())
         .column("mean", |(_, evaluation, summary)| {
@@ -293,8 +293,8 @@ fn table(rig: &Rig, comparisons: &[Comparison], arguments: &Arguments) -> String
         .column("× limit", |(_, evaluation, _)| {
             or_dash(limit_ratio(&rig.setup, evaluation).map(|ratio| format!("{ratio:.3}")))
         })
-        .column("fit", |(comparison, ..)| time(comparison.tried.fit_seconds))
-        .column("a reading", |(comparison, ..)| time(comparison.tried.locate_ns * 1e-9))
+        .column("fit", |(comparison, ..)| time(comparison.timed.fit_seconds))
+        .column("a reading", |(comparison, ..)| time(comparison.timed.locate_ns * 1e-9))
         .to_string()
 }
 

@@ -1,7 +1,7 @@
 //! `palpate evaluate`: errors of a locator, or of the estimator of a rig.
 
 use crate::cost::MemoryOption;
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::input::{RecordingFiles, RigOrLocator};
 use crate::json::object;
 use crate::output::Table;
@@ -20,7 +20,7 @@ use palpate_estimators::fit::FitTask;
 use palpate_estimators::recording::{Provenance, Recording};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Dimension, Quantity, format_length_mm};
-use palpate_report::{EvaluationReport, Judged, evaluation_report};
+use palpate_report::{EstimateOrigin, EvaluationReport, evaluation_report};
 use palpate_rig::Rig;
 use std::path::PathBuf;
 
@@ -97,7 +97,7 @@ impl ErrorFigures {
     }
 }
 
-struct Answers {
+struct EvaluationResult {
     evaluation: Evaluation,
     recording: Provenance,
     subject: RigOrLocator,
@@ -119,9 +119,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
         let report = EvaluationReport {
             title: &format!("Location errors of {}", arguments.subject.display()),
-            judged: match &answers.subject {
-                RigOrLocator::Locator(locator) => Judged::Locator(locator),
-                RigOrLocator::Rig(rig) => Judged::CrossValidated { rig, folds, seed },
+            origin: match &answers.subject {
+                RigOrLocator::Locator(locator) => EstimateOrigin::Locator(locator),
+                RigOrLocator::Rig(rig) => EstimateOrigin::CrossValidated { rig, folds, seed },
             },
             evaluation: &answers.evaluation,
             recording: &answers.recording,
@@ -136,7 +136,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if !arguments.json {
         return print(arguments, &answers, folds, &errors);
     }
-    output::say_json(&object! {
+    output::print_json(&object! {
         "palpate": env!("CARGO_PKG_VERSION"),
         "subject": arguments.subject.display().to_string(),
         "data": &answers.recording.source,
@@ -154,7 +154,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     })
 }
 
-fn errors_table(arguments: &Arguments, answers: &Answers) -> CsvTable {
+fn errors_table(arguments: &Arguments, answers: &EvaluationResult) -> CsvTable {
     let how = match &answers.subject {
         RigOrLocator::Locator(_) => "located".to_owned(),
         RigOrLocator::Rig(_) => format!("cross-validated in {} folds by position", arguments.folds),
@@ -170,7 +170,7 @@ fn errors_table(arguments: &Arguments, answers: &Answers) -> CsvTable {
     table
 }
 
-fn cross_validated(arguments: &Arguments, mut rig: Box<Rig>) -> Result<Answers, Failure> {
+fn cross_validated(arguments: &Arguments, mut rig: Box<Rig>) -> Result<EvaluationResult, Failure> {
     let recording = match arguments.files.read(&rig.setup)? {
         Some(recording) => recording,
         None => Observer::of_stages()
@@ -181,7 +181,7 @@ fn cross_validated(arguments: &Arguments, mut rig: Box<Rig>) -> Result<Answers, 
     let cost = rig.estimator.fit_cost(&rig.setup, &recording);
     arguments.memory.check(&rig.estimator, cost, &rig.setup, &recording)?;
     let recording = recording.in_order();
-    let mut splits = Split::by_folds(&recording, folds).map_err(Complaint::new)?;
+    let mut splits = Split::by_folds(&recording, folds).map_err(UserError::new)?;
     tare_splits(&arguments.tare, &rig.setup, &recording, &mut splits)?;
     let task = FitTask::new(&rig.setup, &recording).seed(seed);
     let chosen = Observer::of_stages()
@@ -196,10 +196,10 @@ fn cross_validated(arguments: &Arguments, mut rig: Box<Rig>) -> Result<Answers, 
         .watch(|watch| evaluate_splits(setup, estimator, &splits, seed, &|| 0.0, watch))
         .map_err(|error| Failure::from_error(&error))?
         .evaluation;
-    Ok(Answers { evaluation, recording: recording.provenance, subject: RigOrLocator::Rig(rig) })
+    Ok(EvaluationResult { evaluation, recording: recording.provenance, subject: RigOrLocator::Rig(rig) })
 }
 
-fn located(arguments: &Arguments, locator: Box<Locator>) -> Result<Answers, Failure> {
+fn located(arguments: &Arguments, locator: Box<Locator>) -> Result<EvaluationResult, Failure> {
     let recording = match arguments.files.read(&locator.setup)? {
         Some(recording) => {
             warn_of_training_data(&locator, &recording);
@@ -220,11 +220,15 @@ fn located(arguments: &Arguments, locator: Box<Locator>) -> Result<Answers, Fail
             recording.provenance.source
         );
     }
-    Ok(Answers { evaluation, recording: recording.provenance, subject: RigOrLocator::Locator(locator) })
+    Ok(EvaluationResult {
+        evaluation,
+        recording: recording.provenance,
+        subject: RigOrLocator::Locator(locator),
+    })
 }
 
-fn simulation_complaint(error: impl std::fmt::Display) -> Complaint {
-    Complaint::new(error).help("--data names a recording to evaluate on")
+fn simulation_complaint(error: impl std::fmt::Display) -> UserError {
+    UserError::new(error).help("--data names a recording to evaluate on")
 }
 
 fn simulated(locator: &Locator, seed: u64) -> Result<Recording, Failure> {
@@ -258,14 +262,17 @@ fn portion(text: &str) -> Result<Portion, String> {
     }
 }
 
-fn errors_by_portion(arguments: &Arguments, answers: &Answers) -> Result<Vec<PortionErrors>, Failure> {
+fn errors_by_portion(
+    arguments: &Arguments,
+    answers: &EvaluationResult,
+) -> Result<Vec<PortionErrors>, Failure> {
     let (evaluation, data) = (&answers.evaluation, &answers.recording.source);
     let named = |portion: &Portion| format!("{}–{} mm", portion.from_m * 1e3, portion.to_m * 1e3);
     let portions = std::iter::once((None, "whole surface".to_owned()))
         .chain(arguments.portion.iter().map(|portion| (Some(*portion), named(portion))));
     let errors = portions.map(|(portion, name)| {
         let summary = evaluation.summary(portion).ok_or_else(|| {
-            Complaint::new(format!("{name} has no contact in {data}")).help("name a portion that was pressed")
+            UserError::new(format!("{name} has no contact in {data}")).help("name a portion that was pressed")
         })?;
         let percent = |error_m| percentage_error(error_m, evaluation.extent.length_m());
         Ok(PortionErrors {
@@ -280,7 +287,7 @@ fn errors_by_portion(arguments: &Arguments, answers: &Answers) -> Result<Vec<Por
 
 fn print(
     arguments: &Arguments,
-    answers: &Answers,
+    answers: &EvaluationResult,
     folds: Option<u16>,
     errors: &[PortionErrors],
 ) -> Result<(), Failure> {
@@ -290,11 +297,11 @@ fn print(
     } + arguments.tare.in_words();
     let count = errors.first().map_or(0, |errors| errors.count);
     let (subject, data) = (arguments.subject.display(), &answers.recording.source);
-    output::say(format!("{subject}: {count} readings of {data}, {how}\n"))?;
+    output::print_line(format!("{subject}: {count} readings of {data}, {how}\n"))?;
     let cell = |errors: &PortionErrors, of: fn(&ErrorFigures) -> f64| {
         format!("{:.3} ({:.2})", of(&errors.error_mm), of(&errors.error_percent))
     };
-    output::say(
+    output::print_line(
         Table::from_rows(errors)
             .column("error, mm (% of length)", |errors| errors.portion.clone())
             .column("contacts", |errors| errors.count.to_string())
@@ -309,18 +316,18 @@ fn print(
         Extent::Line { .. } => "effective",
         Extent::Plane { .. } => "effective area",
     };
-    output::say(format!("\n{what}: {share:.1} % of the contacts within {tolerance} mm"))?;
+    output::print_line(format!("\n{what}: {share:.1} % of the contacts within {tolerance} mm"))?;
     if let (Some(percent), Some(score_m)) =
         (answers.evaluation.coverage_percent(), answers.evaluation.interval_score_m())
     {
         let score = format_length_mm(score_m);
-        output::say(format!(
+        output::print_line(format!(
             "95 % intervals: {percent:.1} % of the contacts in them, interval score {score}"
         ))?;
     }
     if let Some(forces) = answers.evaluation.force_summary() {
         let ForceSummary { average_n, median_n, p95_n, largest_n, coverage_percent, .. } = forces;
-        output::say(format!(
+        output::print_line(format!(
             "error of the force: average {average_n:.3} N, median {median_n:.3} N, 95th percentile {p95_n:.3} N, largest {largest_n:.3} N; \
              {coverage_percent:.1} % in their 95 % intervals"
         ))?;
@@ -329,9 +336,9 @@ fn print(
         let shares = statuses.iter().filter(|(_, percent)| *percent > 0.0);
         let shares: Vec<String> =
             shares.map(|(status, percent)| format!("{percent:.1} % `{}`", status.name())).collect();
-        output::say(format!("statuses: {}", shares.join(", ")))?;
+        output::print_line(format!("statuses: {}", shares.join(", ")))?;
     }
-    output::say_report("", arguments.report.as_deref())
+    output::print_report_path("", arguments.report.as_deref())
 }
 
 #[cfg(test)]

@@ -2,16 +2,16 @@
 
 use super::learnt;
 use crate::cost::MemoryOption;
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::input::RecordingFiles;
 use crate::json::object;
 use crate::progress::Observer;
 use crate::remark::remark;
-use crate::tare::say_drift;
+use crate::tare::print_drift;
 use crate::target::{Inputs, Target};
 use crate::{input, output};
 use palpate_estimators::description;
-use palpate_estimators::estimator::{CHOICE_FOLDS, Choice, FitCost, TimeLimit, Tried};
+use palpate_estimators::estimator::{CHOICE_FOLDS, CandidateErrors, Choice, FitCost, TimeLimit};
 use palpate_estimators::fit::FitTask;
 use palpate_estimators::network::{TrainingOutcome, TrainingStatus};
 use palpate_estimators::recording::Recording;
@@ -67,7 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             let simulated =
                 Observer::of_stages().watch(|watch| rig.simulate_calibration_watched(arguments.seed, watch));
             simulated.map_err(|error| {
-                let about = |error| Complaint::about(&arguments.rig, error);
+                let about = |error| UserError::for_path(&arguments.rig, error);
                 Failure::of_work(error, |error| about(error).help("--data names a recording to fit"))
             })?
         }
@@ -77,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let choice = decide(&rig, &recording, arguments)?;
     let chosen = choice.as_ref().map_or(&rig.estimator, |choice| &choice.best);
     let needed = chosen.positions_needed();
-    recording.check_distinct_positions(needed).map_err(Complaint::new)?;
+    recording.check_distinct_positions(needed).map_err(UserError::new)?;
     let task = FitTask::new(&rig.setup, &recording).seed(arguments.seed);
     let locator = Observer::of_rounds(chosen.most_rounds())
         .watch(|watch| rig.estimator.fit_decided(task.watch(watch), choice.as_ref()))
@@ -90,10 +90,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         )));
     }
     let learnt = learnt::of_locator(&locator);
-    let json = locator.to_json().map_err(Complaint::new)?;
+    let json = locator.to_json().map_err(UserError::new)?;
     out.write(json.as_bytes())?;
     if arguments.json {
-        return output::say_json(&object! {
+        return output::print_json(&object! {
             "palpate": env!("CARGO_PKG_VERSION"),
             "locator": arguments.out.display().to_string(),
             "estimator": locator.kind(),
@@ -106,16 +106,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         });
     }
     let ended = training.map_or_else(String::new, |outcome| format!("; {}", in_words(outcome)));
-    output::say(format!(
+    output::print_line(format!(
         "{} fitted to {} rows{ended}: {}",
         locator.kind(),
         recording.rows.len(),
         arguments.out.display()
     ))?;
     let mut lines =
-        learnt.map(|(linear, names)| description::learnt_summary(linear, &names)).unwrap_or_default();
+        learnt.map(|(linear, names)| description::summary_lines(linear, &names)).unwrap_or_default();
     lines.extend(description::interval_check(locator.interval_check.as_ref()));
-    lines.iter().try_for_each(|line| output::say(format!("  {line}")))
+    lines.iter().try_for_each(|line| output::print_line(format!("  {line}")))
 }
 
 fn cost(rig: &Rig, recording: &Recording, arguments: &Arguments) -> FitCost {
@@ -150,27 +150,27 @@ fn decide(rig: &Rig, recording: &Recording, arguments: &Arguments) -> Result<Opt
         return Ok(None);
     };
     if let Some(spans) = &choice.drift {
-        say_drift(&rig.setup, spans);
+        print_drift(&rig.setup, spans);
     }
     remark!(
         "chosen: {}, by mean error × interval score at held-out positions ({CHOICE_FOLDS} folds)",
         choice.best.name()
     );
     remark!("{:<26} {:>12} {:>20} {:>14}", "", "mean error", "score of 95 %", "95 % covers");
-    for Tried { name, mean_error_m, interval_score_m, coverage_percent } in &choice.tried {
+    for CandidateErrors { name, mean_error_m, interval_score_m, coverage_percent } in &choice.candidates {
         let covers = coverage_percent.map_or_else(|| "–".to_owned(), |percent| format!("{percent:.1} %"));
         let [error, score] = [mean_error_m, interval_score_m].map(|length_m| format_length_mm(*length_m));
         remark!("{name:<26} {error:>12} {score:>20} {covers:>14}");
     }
-    for (name, reason) in &choice.left_out {
+    for (name, reason) in &choice.omitted {
         remark!("{name:<26} skipped: {reason}");
     }
     Ok(Some(choice))
 }
 
 /// The chosen candidate is first; `None` if the rig names its estimator.
-fn choice_json(tried: &[Tried]) -> Option<Vec<impl Serialize>> {
-    let one = |tried: &Tried| {
+fn choice_json(tried: &[CandidateErrors]) -> Option<Vec<impl Serialize>> {
+    let one = |tried: &CandidateErrors| {
         object! {
             "estimator": tried.name.clone(),
             "mean_error_mm": tried.mean_error_m * 1e3,

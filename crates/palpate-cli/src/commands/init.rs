@@ -1,7 +1,7 @@
 //! `palpate init`: a first rig for an existing recording.
 
 use super::sample_benches::{self, Request, SampleBench};
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::json::object;
 use crate::remark::remark;
 use crate::target::{Inputs, Target};
@@ -87,16 +87,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let name = arguments.recording.display().to_string();
     let bytes = input::read_bytes(&arguments.recording)?;
     let first =
-        FirstRig::guess(&name, &bytes, &arguments.hints()).map_err(|error| complaint(&error, &name))?;
+        FirstRig::infer(&name, &bytes, &arguments.hints()).map_err(|error| complaint(&error, &name))?;
     let rig_name = arguments.out.as_ref().map_or("RIG.toml".to_owned(), |out| out.display().to_string());
     let text = first.to_toml(&rig_name);
     // Parsed as in every later command, so that warnings about file and channels appear now.
-    let rig = Rig::from_toml(&text).map_err(Complaint::new)?;
+    let rig = Rig::from_toml(&text).map_err(UserError::new)?;
     let recording = rig.setup.read_recording(&name, bytes.as_slice());
     let recording = recording.map_err(|error| input::csv_complaint(&error))?;
-    input::say_dialects(&recording);
+    input::print_dialects(&recording);
     first.warnings().iter().for_each(|warning| remark!("warning: {name}: {warning}"));
-    if recording.hardly_tells_noise() {
+    if recording.has_unreliable_noise() {
         let presses = recording.rows.iter().filter(|row| row.touches()).count();
         remark!("warning: {name}: {}", description::noise_is_hardly_told(presses));
     }
@@ -105,16 +105,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     out.write(text.as_bytes())?;
     if arguments.json {
-        return output::say_json(&object! {
+        return output::print_json(&object! {
             "palpate": env!("CARGO_PKG_VERSION"),
             "rig": &rig_name,
             "files": [&rig_name],
             "commands": first.next_commands(&rig_name),
         });
     }
-    output::say(format!("{rig_name}: {}", first.summary()))?;
-    output::say("Check what is marked as a guess there; then:")?;
-    first.next_commands(&rig_name).iter().try_for_each(|command| output::say(format!("  {command}")))
+    output::print_line(format!("{rig_name}: {}", first.summary()))?;
+    output::print_line("Check what is marked as a guess there; then:")?;
+    first.next_commands(&rig_name).iter().try_for_each(|command| output::print_line(format!("  {command}")))
 }
 
 impl Arguments {
@@ -122,7 +122,7 @@ impl Arguments {
         let Some(out) = &self.out else { return Ok(None) };
         let target = Target::new(out, &Inputs::new([self.recording.as_path()]))?;
         if out.exists() && !self.overwrite {
-            let complaint = Complaint::new(format!("{} exists already", out.display()));
+            let complaint = UserError::new(format!("{} exists already", out.display()));
             return Err(complaint.help("name another file, or overwrite it with --overwrite").into());
         }
         Ok(Some(target))
@@ -147,7 +147,7 @@ impl Arguments {
 fn complaint(error: &FirstRigError, name: &str) -> Failure {
     let complaint = match error {
         FirstRigError::Csv(error) => input::csv_complaint(error),
-        _ => Complaint::new(format!("{name}: {error}")),
+        _ => UserError::new(format!("{name}: {error}")),
     };
     match error.help() {
         Some(help) => complaint.help(help).into(),

@@ -46,9 +46,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         _ => description::locator(fitted.insert(input::parse_locator(path, &text)?)),
     };
     if !arguments.json {
-        return output::say(lines.join("\n"));
+        return output::print_line(lines.join("\n"));
     }
-    output::say_json(&object! {
+    output::print_json(&object! {
         "palpate": env!("CARGO_PKG_VERSION"),
         "file": path.display().to_string(),
         "says": lines,

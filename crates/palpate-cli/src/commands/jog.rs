@@ -1,6 +1,6 @@
 //! Jogs and touch-offs of a machine with the keys of a terminal, before a calibration.
 
-use super::operator::say;
+use super::operator::print_notes;
 use crate::progress;
 use crate::remark::alert;
 use palpate_live::calibration::{Calibration, Machine, MachineError, MachineNote, SetUpNote, SetUpTask};
@@ -80,9 +80,9 @@ impl Jog {
                 }
                 Err(RecvTimeoutError::Disconnected) => std::thread::sleep(LOOK_EVERY),
             }
-            say(&notes, &self.calibration, None);
+            print_notes(&notes, &self.calibration, None);
             self.take_keys(keys)?;
-            self.machine.heed(&notes)?;
+            self.machine.stop_on_notes(&notes)?;
             match self.machine.step(self.clock.elapsed(), &mut self.calibration)? {
                 Some(MachineNote::Homing) => alert!("the machine searches for its end stops"),
                 Some(MachineNote::SetUp(note)) => {

@@ -1,15 +1,15 @@
 //! `palpate limit`: Cramér–Rao bound and smallest detectable force of a bench, by position.
 
 use crate::cost::MemoryOption;
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::input::{self, RigOrLocator};
 use crate::json::object;
 use crate::output::{self, Table, figure};
 use crate::progress::Observer;
 use crate::tables::{self, CsvTable};
 use crate::target::{Inputs, TargetFolder};
+use palpate_estimators::detectable_force::{DetectableForce, TouchSummary};
 use palpate_estimators::influence::{ForceLinearLocator, Influence};
-use palpate_estimators::lightest_touch::{LightestTouch, TouchSummary};
 use palpate_estimators::setup::{Setup, SetupError};
 use palpate_estimators::status::FalseAlarmRate;
 use palpate_mechanics::contact::{Contact, Position};
@@ -69,11 +69,11 @@ struct Limits<'a> {
     limit: &'a CramerRaoBound<'a>,
     force_n: f64,
     force: Force,
-    known: LimitCurve,
-    unknown: LimitCurve,
+    known_force: LimitCurve,
+    unknown_force: LimitCurve,
     listed: Vec<Position>,
     warnings: Vec<LimitWarning>,
-    touch: &'a LightestTouch<'a>,
+    touch: &'a DetectableForce<'a>,
     /// Smallest detectable force over the surface, for both detection probabilities.
     touches: [Option<TouchSummary>; 2],
 }
@@ -92,7 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     check_cost(&setup, listed.len(), arguments)?;
     let (limit, mut touch);
-    match learnt(&bench) {
+    match force_linear_locator(&bench) {
         Some(linear) => {
             limit = linear.cramer_rao_bound(extent);
             touch = linear.lightest_touch();
@@ -105,7 +105,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
     }
     if let RigOrLocator::Locator(locator) = &bench {
-        touch = locator.beyond_scatter(touch);
+        touch = locator.add_scatter(touch);
     }
     let limits = Observer::of_stages()
         .watch(|watch| limits(&limit, &touch, &setup, listed, arguments, watch))
@@ -114,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         write_report(&limits, &setup, arguments, folder)?;
     }
     if arguments.json {
-        output::say_json(&json(&limits, &setup, arguments))
+        output::print_json(&json(&limits, &setup, arguments))
     } else {
         print(&limits, &setup, arguments)
     }
@@ -127,7 +127,7 @@ fn check_cost(setup: &Setup, listed: usize, arguments: &Arguments) -> Result<(),
     arguments.memory.check_work(&what, cost.seconds, cost.memory_bytes, "take fewer sensors or `elements`")
 }
 
-fn learnt(bench: &RigOrLocator) -> Option<&ForceLinearLocator> {
+fn force_linear_locator(bench: &RigOrLocator) -> Option<&ForceLinearLocator> {
     match bench {
         RigOrLocator::Locator(locator) => locator.force_linear(),
         RigOrLocator::Rig(_) => None,
@@ -146,22 +146,22 @@ fn setup(bench: &RigOrLocator, arguments: &Arguments) -> Result<Setup, Failure> 
     let mut setup = match bench {
         RigOrLocator::Rig(rig) => rig.setup.clone(),
         RigOrLocator::Locator(locator) => {
-            locator.learnt_setup().map_err(|error| Complaint::about(&arguments.rig, error))?
+            locator.learnt_setup().map_err(|error| UserError::for_path(&arguments.rig, error))?
         }
     };
-    if let (Some(_), Some(noise)) = (learnt(bench), arguments.noise.first()) {
+    if let (Some(_), Some(noise)) = (force_linear_locator(bench), arguments.noise.first()) {
         let complaint =
             format!("--noise {noise}: the noise of a locator of a measured surface is what it learnt");
-        return Err(Complaint::new(complaint).help("leave --noise out").into());
+        return Err(UserError::new(complaint).help("leave --noise out").into());
     }
     for noise in &arguments.noise {
         setup = setup.with_noise(*noise).map_err(|error| match error {
             SetupError::NoSensorOfUnit { .. } => {
                 let complaint =
-                    Complaint::new(format!("--noise {noise}: no sensor of the rig measures in this unit"));
+                    UserError::new(format!("--noise {noise}: no sensor of the rig measures in this unit"));
                 complaint.help("give the noise in the unit of the readings, as in \"5 um\"")
             }
-            error => Complaint::new(format!("--noise {noise}: {error}")),
+            error => UserError::new(format!("--noise {noise}: {error}")),
         })?;
     }
     Ok(setup)
@@ -171,7 +171,7 @@ fn complaint(error: LimitError, rig: &Path) -> Failure {
     if Cancelled::caused(&error) {
         return Failure::stopped();
     }
-    let complaint = Complaint::about(rig, error);
+    let complaint = UserError::for_path(rig, error);
     let help = match error {
         LimitError::NoModel => {
             "fit `kind = \"influence\"` to a recording with forces, and name its locator instead of the rig; or give a surface with a model, such as `kind = \"beam\"`"
@@ -191,7 +191,7 @@ fn complaint(error: LimitError, rig: &Path) -> Failure {
 
 fn limits<'a>(
     limit: &'a CramerRaoBound<'a>,
-    touch: &'a LightestTouch<'a>,
+    touch: &'a DetectableForce<'a>,
     setup: &Setup,
     listed: Vec<Position>,
     arguments: &Arguments,
@@ -209,8 +209,8 @@ fn limits<'a>(
         force,
         touch,
         touches: touch.summaries(&positions),
-        known,
-        unknown: LimitCurve::over_surface(limit, force_n, Force::Unknown)?,
+        known_force: known,
+        unknown_force: LimitCurve::over_surface(limit, force_n, Force::Unknown)?,
         listed,
         warnings: limit_warnings(limit, force_n, force, watch)?,
     })
@@ -248,8 +248,8 @@ fn write_report(
         title: &format!("What physics allows: the limit of {}", arguments.rig.display()),
         setup,
         limit: limits.limit,
-        known: &limits.known,
-        unknown: &limits.unknown,
+        known_force: &limits.known_force,
+        unknown_force: &limits.unknown_force,
         force: limits.force,
         warnings: &limits.warnings,
         listed: &limits.listed,
@@ -261,7 +261,7 @@ fn write_report(
 
 /// Cells of unidentifiable contacts are empty.
 fn limit_table(limits: &Limits, arguments: &Arguments) -> CsvTable {
-    let extent = limits.known.extent;
+    let extent = limits.known_force.extent;
     let comment = format!(
         "limit of {}, {} N, {} of false alarms",
         arguments.rig.display(),
@@ -276,7 +276,7 @@ fn limit_table(limits: &Limits, arguments: &Arguments) -> CsvTable {
         "lightest_touch_95_percent_n",
     ];
     let mut table = CsvTable::new(&comment, [tables::position_columns(extent), figures.to_vec()].concat());
-    for (known, unknown) in limits.known.points.iter().zip(&limits.unknown.points) {
+    for (known, unknown) in limits.known_force.points.iter().zip(&limits.unknown_force.points) {
         let mm = |bound: &Option<Bound>| bound.map(|bound| bound.sd_position_m * 1e3);
         let [half_n, surely_n] = limits.touch.forces_at(known.position);
         let force_n = unknown.bound.and_then(|bound| bound.sd_force_n);
@@ -298,8 +298,8 @@ fn json(limits: &Limits, setup: &Setup, arguments: &Arguments) -> impl Serialize
             "least_at_mm": in_mm(summary.best.0),
             "largest_mm": summary.worst.1 * 1e3,
             "largest_at_mm": in_mm(summary.worst.0),
-            "positions_without": summary.without,
-            "share_without_percent": 100.0 * summary.without as f64 / limits.known.points.len() as f64,
+            "positions_without": summary.unidentifiable,
+            "share_without_percent": 100.0 * summary.unidentifiable as f64 / limits.known_force.points.len() as f64,
         }
     };
     let at = |&position: &Position| {
@@ -320,7 +320,7 @@ fn json(limits: &Limits, setup: &Setup, arguments: &Arguments) -> impl Serialize
             "median_n": summary.median_n,
             "largest_n": summary.worst.1,
             "largest_at_mm": in_mm(summary.worst.0),
-            "positions_without": summary.without,
+            "positions_without": summary.undetected,
         }
     };
     let warning = |warning: &LimitWarning| {
@@ -342,12 +342,12 @@ fn json(limits: &Limits, setup: &Setup, arguments: &Arguments) -> impl Serialize
         "rig": arguments.rig.display().to_string(),
         "length_mm": setup.surface().extent().length_m() * 1e3,
         "sensors": setup.layout().len(),
-        "sensors_alive": limits.limit.alive(),
+        "sensors_alive": limits.limit.enabled_count(),
         "force_n": limits.force_n,
         // Knowledge of the force in the rig, which the warnings assume.
         "force": limits.force,
-        "known_force": limits.known.summary().map(summary),
-        "unknown_force": limits.unknown.summary().map(summary),
+        "known_force": limits.known_force.summary().map(summary),
+        "unknown_force": limits.unknown_force.summary().map(summary),
         "false_alarm_rate_percent": limits.touch.rate().share() * 100.0,
         "lightest_touch": limits.touches.iter().map(|summary| summary.as_ref().map(touch)).collect::<Vec<_>>(),
         "positions": limits.listed.iter().map(at).collect::<Vec<_>>(),
@@ -360,23 +360,23 @@ fn in_mm(position: Position) -> [f64; 2] {
 }
 
 fn print(limits: &Limits, setup: &Setup, arguments: &Arguments) -> Result<(), Failure> {
-    output::say(format!(
+    output::print_line(format!(
         "{}: {} of {} sensors alive, {} N, force {}\n",
         arguments.rig.display(),
-        limits.limit.alive(),
+        limits.limit.enabled_count(),
         setup.layout().len(),
         limits.force_n,
         limits.force.name()
     ))?;
-    match limits.known.extent {
+    match limits.known_force.extent {
         line @ Extent::Line { .. } => print_line(limits, line)?,
         Extent::Plane { .. } => print_plane(limits)?,
     }
-    output::say(format!("{}\n{}", not_told_in_words(limits), lightest_touch_in_words(limits)))?;
+    output::print_line(format!("{}\n{}", unidentifiable_lines(limits), lightest_touch_in_words(limits)))?;
     for warning in &limits.warnings {
-        output::say(format!("\nwarning: {warning}\n  would help: {}", warning.help()))?;
+        output::print_line(format!("\nwarning: {warning}\n  would help: {}", warning.help()))?;
     }
-    output::say_report("\n", arguments.report.as_deref())
+    output::print_report_path("\n", arguments.report.as_deref())
 }
 
 fn print_line(limits: &Limits, extent: Extent) -> Result<(), Failure> {
@@ -386,9 +386,11 @@ fn print_line(limits: &Limits, extent: Extent) -> Result<(), Failure> {
         .column("limit, mm", |(position, _)| extent.place_in_words(*position))
         .column("force known", |(_, [known, _])| limit(*known))
         .column("force unknown", |(_, [_, unknown])| limit(*unknown))
-        .column("force itself, N", |(_, [_, unknown])| told(unknown.and_then(|bound| bound.sd_force_n)))
+        .column("force itself, N", |(_, [_, unknown])| {
+            figure_or_unidentifiable(unknown.and_then(|bound| bound.sd_force_n))
+        })
         .column("lightest touch, N", |(position, _)| force_figure(limits.touch.forces_at(*position)[1]));
-    output::say(summary_rows(limits).into_iter().fold(table, Table::row))
+    output::print_line(summary_rows(limits).into_iter().fold(table, Table::row))
 }
 
 fn print_plane(limits: &Limits) -> Result<(), Failure> {
@@ -397,7 +399,7 @@ fn print_plane(limits: &Limits) -> Result<(), Failure> {
     rows.reverse();
     let columns = rows.first().map_or(&[][..], |row| *row);
     if columns.len() > MOST_COLUMNS {
-        return print_line(limits, limits.known.extent);
+        return print_line(limits, limits.known_force.extent);
     }
     for (force, name) in [(Force::Known, "force known"), (Force::Unknown, "force unknown")] {
         let cell = |position: Position| {
@@ -410,31 +412,34 @@ fn print_plane(limits: &Limits) -> Result<(), Failure> {
         let table = columns.iter().enumerate().fold(table, |table, (i, at)| {
             table.column(format!("x {}", format_length_mm(at.x_m)), |row| cell(row[i]))
         });
-        output::say(format!("{table}\n"))?;
+        output::print_line(format!("{table}\n"))?;
     }
     let table = Table::from_rows([]).column("limit, mm", |()| String::new());
     let table = ["force known", "force unknown", "", ""]
         .into_iter()
         .fold(table, |t, name| t.column(name, |()| String::new()));
-    output::say(summary_rows(limits).into_iter().fold(table, Table::row))
+    output::print_line(summary_rows(limits).into_iter().fold(table, Table::row))
 }
 
 fn limit_figure(bound: Option<&Bound>) -> String {
-    told(bound.map(|bound| bound.sd_position_m * 1e3))
+    figure_or_unidentifiable(bound.map(|bound| bound.sd_position_m * 1e3))
 }
 
-fn told(value: Option<f64>) -> String {
+fn figure_or_unidentifiable(value: Option<f64>) -> String {
     value.map_or_else(|| "unidentifiable".to_owned(), |value| figure(Some(value)))
 }
 
-fn not_told_in_words(limits: &Limits) -> String {
+fn unidentifiable_lines(limits: &Limits) -> String {
     let line = |(curve, name): (&LimitCurve, &str)| {
-        let words = curve.not_told_in_words()?;
+        let words = curve.unidentifiable_text()?;
         Some(format!(
             "\nforce {name}: unidentifiable, and excluded from the limits over the surface, {words}\n"
         ))
     };
-    [(&limits.known, "known"), (&limits.unknown, "unknown")].into_iter().filter_map(line).collect()
+    [(&limits.known_force, "known"), (&limits.unknown_force, "unknown")]
+        .into_iter()
+        .filter_map(line)
+        .collect()
 }
 
 fn force_figure(force_n: Option<f64>) -> String {
@@ -443,12 +448,12 @@ fn force_figure(force_n: Option<f64>) -> String {
 }
 
 fn lightest_touch_in_words(limits: &Limits) -> String {
-    let extent = limits.known.extent;
+    let extent = limits.known_force.extent;
     let rate = limits.touch.rate();
     let [Some(half), Some(surely)] = &limits.touches else {
         return format!("lightest touch: no force is detected at {rate} of false alarms");
     };
-    let without = match surely.without {
+    let without = match surely.undetected {
         0 => String::new(),
         1 => ", none at 1 position".to_owned(),
         without => format!(", none at {without} positions"),
@@ -466,7 +471,7 @@ fn lightest_touch_in_words(limits: &Limits) -> String {
 
 /// Rows of the limit over the whole surface.
 fn summary_rows(limits: &Limits) -> Vec<Vec<String>> {
-    let summaries = [limits.known.summary(), limits.unknown.summary()];
+    let summaries = [limits.known_force.summary(), limits.unknown_force.summary()];
     let row = |name: &str, of: fn(&LimitSummary) -> f64| {
         let [known, unknown] = summaries.map(|summary| figure(summary.as_ref().map(|s| of(s) * 1e3)));
         vec![name.to_owned(), known, unknown, String::new(), String::new()]

@@ -1,10 +1,10 @@
 //! `palpate locate`: an estimate for each line of readings.
 
-use crate::estimate_columns::{EstimateColumns, Guesses};
-use crate::failure::{Complaint, Failure};
+use crate::estimate_columns::{EstimateColumns, EstimateRows};
+use crate::failure::{Failure, UserError};
 use crate::json::object;
 use crate::lines::{Lines, Readings, Records};
-use crate::tare::{Taken, TareOption, Taring};
+use crate::tare::{TareOption, TareOutcome, Taring};
 use crate::{input, output};
 use palpate_estimators::digit::{DigitShape, ShapePoint};
 use palpate_estimators::estimate_record::EstimateRecord;
@@ -56,12 +56,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     for channel in &arguments.disable {
         // An invalid channel, like those beyond the last.
         let left_out = locator.leave_out(channel.wrapping_sub(1));
-        left_out.map_err(|error| Complaint::new(format!("--disable {channel}: {error}")))?;
+        left_out.map_err(|error| UserError::new(format!("--disable {channel}: {error}")))?;
     }
     if arguments.shape.is_some() && locator.kind() != "digit" {
         let complaint =
             format!("--shape: a locator of kind `{}` does not estimate the shape", locator.kind());
-        return Err(Complaint::new(complaint).help("only the `digit` estimator does").into());
+        return Err(UserError::new(complaint).help("only the `digit` estimator does").into());
     }
     let path = arguments.readings.as_deref().unwrap_or(Path::new("-"));
     let tare = arguments.tare.in_use(&locator);
@@ -69,7 +69,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let records = if arguments.json { Records::Json } else { Records::None };
     let mut readings = Readings::new(Lines::open(path, records)?, &locator.setup, arguments.no_header);
     let extent = locator.setup.surface().extent();
-    let columns = EstimateColumns::new(&locator, Guesses::by_option(arguments.all));
+    let columns = EstimateColumns::new(&locator, EstimateRows::by_option(arguments.all));
     let mut out = std::io::stdout().lock();
     if !arguments.json {
         output::print(&mut out, columns.heading("line").as_bytes())?;
@@ -78,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let estimate = match locate(&locator, taring.as_mut(), &mut reading, readings.time_s()) {
             Ok(estimate) => estimate,
             Err(error) => {
-                readings.lines.lose(&*error)?;
+                readings.lines.skip_reading(&*error)?;
                 continue;
             }
         };
@@ -98,7 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         output::flush(&mut out)?;
     }
     if readings.awaits_columns() && readings.lines.is_whole() {
-        let complaint = Complaint::new(format!("{} contains no reading", readings.lines.name()));
+        let complaint = UserError::new(format!("{} contains no reading", readings.lines.name()));
         return Err(complaint.help("it must begin with a header; --no-header reads values alone").into());
     }
     if let Some(taring) = &taring {
@@ -115,9 +115,9 @@ fn locate(
     time_s: Option<f64>,
 ) -> Result<Option<Estimate>, Box<dyn Error>> {
     match taring.map(|taring| taring.take(reading, time_s)).transpose()? {
-        Some(Taken::Baseline) => Ok(None),
-        Some(Taken::Located(estimate)) => Ok(Some(*estimate)),
-        Some(Taken::Tared) | None => Ok(Some(locator.locate(reading)?)),
+        Some(TareOutcome::Baseline) => Ok(None),
+        Some(TareOutcome::Located(estimate)) => Ok(Some(*estimate)),
+        Some(TareOutcome::Tared) | None => Ok(Some(locator.locate(reading)?)),
     }
 }
 
@@ -147,7 +147,7 @@ fn json(
 }
 
 fn json_line(object: &impl Serialize) -> Result<String, Failure> {
-    serde_json::to_string(object).map(|line| line + "\n").map_err(|error| Complaint::new(error).into())
+    serde_json::to_string(object).map(|line| line + "\n").map_err(|error| UserError::new(error).into())
 }
 
 /// Returns a point of the finger's centre line: arc length, position and standard deviations.

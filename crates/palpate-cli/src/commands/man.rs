@@ -1,6 +1,6 @@
 //! `palpate man`: the manual pages of all verbs.
 
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::output;
 use crate::target::{Inputs, TargetFolder};
 use std::path::PathBuf;
@@ -29,12 +29,12 @@ pub fn run(arguments: &Arguments, mut command: clap::Command) -> Result<(), Fail
     command = command.disable_help_subcommand(true);
     command.build();
     let mut pages = Vec::new();
-    add_pages(&command, &mut pages).map_err(Complaint::new)?;
+    add_pages(&command, &mut pages).map_err(UserError::new)?;
     let folder = TargetFolder::for_report(&arguments.out, &Inputs::new([]))?;
     for page in &pages {
         folder.write(&page.name, &page.bytes)?;
     }
-    output::say(format!("{} manual pages: {}", pages.len(), arguments.out.display()))
+    output::print_line(format!("{} manual pages: {}", pages.len(), arguments.out.display()))
 }
 
 fn add_pages(command: &clap::Command, pages: &mut Vec<ManualPage>) -> std::io::Result<()> {

@@ -17,8 +17,6 @@ pub mod locate;
 pub mod man;
 #[cfg(feature = "live")]
 mod operator;
-#[cfg(feature = "live")]
-mod outlets;
 pub mod profile;
 #[cfg(feature = "live")]
 pub mod record;
@@ -32,5 +30,7 @@ pub mod serve;
 pub mod simulate;
 #[cfg(feature = "live")]
 pub mod simulated_board;
+#[cfg(feature = "live")]
+mod sink_options;
 pub mod study;
 pub mod track;

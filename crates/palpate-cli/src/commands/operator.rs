@@ -6,7 +6,7 @@ use crate::remark::alert;
 use crate::{input, output, progress};
 use palpate_estimators::recording::Row;
 use palpate_live::calibration::{
-    Calibration, Check, Note, Press, Statements, Waiting, deviation_percent, last_deviation_percent,
+    AwaitedStep, Calibration, Check, Note, Press, Statements, deviation_percent, last_deviation_percent,
 };
 use palpate_live::feed::REPEATED_READINGS;
 use palpate_mechanics::contact::Position;
@@ -31,7 +31,7 @@ pub fn ask(
     }
     if stated.placement_sd_m.is_none() {
         alert!("standard deviation between requested and pressed position? as in 2 mm; Enter: unknown");
-        stated.placement_sd_m = answer(keys, |text| input::length(text).map(Some))?;
+        stated.placement_sd_m = read_answer(keys, |text| input::length(text).map(Some))?;
     }
     if let Some(force_n) = stated.single_weight_n(rig, force_n) {
         alert!("{}", single_weight(force_n));
@@ -43,7 +43,7 @@ pub fn ask(
             "known" => Ok(Some(None)),
             text => input::force(text).map(|second_n| Some(Some(second_n))),
         };
-        match answer(keys, parse)? {
+        match read_answer(keys, parse)? {
             Some(Some(second_n)) => stated.second_force_n = Some(second_n),
             Some(None) => stated.force_is_known = true,
             None => {}
@@ -59,7 +59,7 @@ pub fn single_weight(force_n: f64) -> String {
 }
 
 /// Returns true if an operator at the terminal requests a check.
-pub fn wants_check(keys: &Receiver<String>) -> bool {
+pub fn asks_for_check(keys: &Receiver<String>) -> bool {
     if !std::io::stdin().is_terminal() {
         return false;
     }
@@ -69,11 +69,11 @@ pub fn wants_check(keys: &Receiver<String>) -> bool {
         "n" | "no" => Ok(None),
         _ => Err("y or n".to_owned()),
     };
-    matches!(answer(keys, parse), Ok(Some(())))
+    matches!(read_answer(keys, parse), Ok(Some(())))
 }
 
 /// Returns the next valid line; `None` for an empty one or at the end.
-fn answer<T>(
+fn read_answer<T>(
     keys: &Receiver<String>,
     parse: impl Fn(&str) -> Result<Option<T>, String>,
 ) -> Result<Option<T>, Failure> {
@@ -109,7 +109,11 @@ pub fn list(rows: &[Row], extent: Extent) {
     }
 }
 
-pub fn say_check(check: Option<&Check>, placement_sd_m: Option<f64>, extent: Extent) -> Result<(), Failure> {
+pub fn print_check(
+    check: Option<&Check>,
+    placement_sd_m: Option<f64>,
+    extent: Extent,
+) -> Result<(), Failure> {
     let Some(check) = check else {
         alert!("no place was checked");
         return Ok(());
@@ -122,7 +126,7 @@ pub fn say_check(check: Option<&Check>, placement_sd_m: Option<f64>, extent: Ext
             None => "",
         };
         let (place, estimate) = (at(checked.position), at(checked.estimate));
-        output::say(format!(
+        output::print_line(format!(
             "pressed at {place}: located at {estimate}, {} off{covered}",
             format_length_mm(checked.error_m)
         ))?;
@@ -134,7 +138,7 @@ pub fn say_check(check: Option<&Check>, placement_sd_m: Option<f64>, extent: Ext
     let placement = placement_sd_m.map_or_else(String::new, |sd_m| {
         format!("; it includes your placement of {}", format_length_mm(sd_m))
     });
-    output::say(format!("error at fresh places: median {median}, mean {mean}{covered}{placement}"))
+    output::print_line(format!("error at fresh places: median {median}, mean {mean}{covered}{placement}"))
 }
 
 pub fn check_json(check: &Check) -> impl Serialize + use<> {
@@ -157,7 +161,7 @@ pub fn check_json(check: &Check) -> impl Serialize + use<> {
 }
 
 /// Prints the events and the operator's next action; `hand` is the extent of the surface.
-pub fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
+pub fn print_notes(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
     for note in notes {
         match note {
             Note::Opened(name) => alert!("readings from {name}"),
@@ -189,14 +193,14 @@ pub fn say(notes: &[Note], calibration: &Calibration, hand: Option<Extent>) {
 
 pub fn ask_for(calibration: &Calibration, extent: Extent) {
     let guide = calibration.guide();
-    match (guide.waiting(), guide.next_press()) {
-        (Waiting::Untouched, _) => alert!("leave the surface alone"),
-        (Waiting::Press, Some((number, press))) => {
+    match (guide.awaited_step(), guide.next_press()) {
+        (AwaitedStep::Untouched, _) => alert!("leave the surface alone"),
+        (AwaitedStep::Press, Some((number, press))) => {
             alert!("press at {} ({} of {})", place(press, extent), number + 1, guide.plan().len());
         }
-        (Waiting::Rest, _) => alert!("hold"),
-        (Waiting::Release, _) => alert!("let go"),
-        (Waiting::Press | Waiting::Nothing, _) => {}
+        (AwaitedStep::Rest, _) => alert!("hold"),
+        (AwaitedStep::Release, _) => alert!("let go"),
+        (AwaitedStep::Press | AwaitedStep::Nothing, _) => {}
     }
 }
 

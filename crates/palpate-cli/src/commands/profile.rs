@@ -1,6 +1,6 @@
 //! `palpate profile`: the load profile of each reading.
 
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::input::RigOrLocator;
 use crate::lines::{Lines, Readings, Records};
 use crate::output::{self, Table};
@@ -68,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         profiler: &profiler,
         report: report.as_ref(),
         truth: &[],
-        told: 0,
+        printed: 0,
     };
     match &arguments.readings {
         Some(readings) => printer.stream(readings),
@@ -76,13 +76,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-fn sensors_complaint(error: LoadSensorsError, path: &Path) -> Complaint {
+fn sensors_complaint(error: LoadSensorsError, path: &Path) -> UserError {
     let help = match error {
         LoadSensorsError::NoModel => "give a surface with a model, such as `kind = \"beam\"`",
         LoadSensorsError::Noise(ref error) => error.help(),
         LoadSensorsError::Surface(ref error) => error.help(),
     };
-    Complaint::about(path, error).help(help)
+    UserError::for_path(path, error).help(help)
 }
 
 struct Printer<'a> {
@@ -91,7 +91,7 @@ struct Printer<'a> {
     profiler: &'a Profiler<'a>,
     report: Option<&'a TargetFolder>,
     truth: &'a [UniformLoad],
-    told: u64,
+    printed: u64,
 }
 
 impl Printer<'_> {
@@ -103,7 +103,7 @@ impl Printer<'_> {
         if loads.is_empty() {
             let path = self.arguments.subject.display();
             let complaint =
-                Complaint::new(format!("{path} has no [[load]] to simulate, and no readings are given"));
+                UserError::new(format!("{path} has no [[load]] to simulate, and no readings are given"));
             let help = "name a file of readings, or add [[load]] with `from`, `to` and `force` to the rig";
             return Err(complaint.help(help).into());
         }
@@ -112,7 +112,7 @@ impl Printer<'_> {
         let readings =
             Observer::of_stages().watch(|watch| simulate_loads_watched(setup, loads, 1, seed, watch));
         for reading in readings.map_err(|error| Failure::from_error(&error))? {
-            self.tell(&reading, None)?;
+            self.print_profile(&reading, None)?;
         }
         Ok(())
     }
@@ -123,32 +123,32 @@ impl Printer<'_> {
             Readings::new(Lines::open(path, records)?, self.subject.setup(), self.arguments.no_header)
         };
         while let Some(reading) = readings.next()? {
-            self.tell(&reading, Some(readings.lines.count))?;
+            self.print_profile(&reading, Some(readings.lines.count))?;
         }
-        if self.told == 0 && readings.lines.is_whole() {
-            return Err(Complaint::new(format!("{} contains no reading", readings.lines.name())).into());
+        if self.printed == 0 && readings.lines.is_whole() {
+            return Err(UserError::new(format!("{} contains no reading", readings.lines.name())).into());
         }
         readings.lines.finish("profile")
     }
 
     /// Prints the profile of a reading; the first one also gets a report.
-    fn tell(&mut self, reading: &[f64], line: Option<u64>) -> Result<(), Failure> {
-        let profile = self.profiler.profile(reading).map_err(Complaint::new)?;
+    fn print_profile(&mut self, reading: &[f64], line: Option<u64>) -> Result<(), Failure> {
+        let profile = self.profiler.profile(reading).map_err(UserError::new)?;
         let extent = self.profiler.cells().extent;
         let loads: Vec<UniformLoad> = profile.patches.iter().map(|patch| patch.as_load(extent)).collect();
         let limits = patch_limits(self.profiler.sensors(), &loads);
-        self.told += 1;
-        if let (1, Some(report)) = (self.told, self.report) {
+        self.printed += 1;
+        if let (1, Some(report)) = (self.printed, self.report) {
             self.write_report(reading, &profile, limits.as_deref(), line, report)?;
         }
         let told = JsonProfile::new(self.profiler, &profile, limits.as_deref(), self.truth, line);
         if self.arguments.json {
-            let json = serde_json::to_string(&told).map_err(Complaint::new)?;
-            return output::say(json);
+            let json = serde_json::to_string(&told).map_err(UserError::new)?;
+            return output::print_line(json);
         }
         print(&told)?;
-        let folder = self.report.filter(|_| self.told == 1).map(TargetFolder::path);
-        output::say_report("\n", folder)
+        let folder = self.report.filter(|_| self.printed == 1).map(TargetFolder::path);
+        output::print_report_path("\n", folder)
     }
 
     fn write_report(
@@ -187,38 +187,44 @@ fn print(told: &JsonProfile) -> Result<(), Failure> {
         Some(line) => format!("line {line}: {}", told.status),
         None => format!("simulated: {}", told.status),
     };
-    output::say(heading)?;
+    output::print_line(heading)?;
     if told.status == Status::Ambiguous.name() {
-        output::say(
+        output::print_line(
             "the number of patches is not resolved: more than these explain the reading better, at 5 %",
         )?;
     }
-    let misfit =
-        if told.misfit < 1e6 { format!("{:.1}", told.misfit) } else { format!("{:.1e}", told.misfit) };
-    output::say(format!("misfit {misfit}; noise alone rarely exceeds {:.1}", told.worst_misfit))?;
+    let misfit = if told.chi_squared < 1e6 {
+        format!("{:.1}", told.chi_squared)
+    } else {
+        format!("{:.1e}", told.chi_squared)
+    };
+    output::print_line(format!("misfit {misfit}; noise alone rarely exceeds {:.1}", told.worst_misfit))?;
     let Some(centre) = &told.centre_x_mm else { return Ok(()) };
-    output::say(format!("total force         {}, for any shape of the load", interval(&told.total_n, "N")))?;
-    let Seen { margin_mm, low_n, high_n } = told.seen;
-    output::say(format!(
+    output::print_line(format!(
+        "total force         {}, for any shape of the load",
+        interval(&told.total_n, "N")
+    ))?;
+    let InteriorForce { margin_mm, low_n, high_n } = told.interior;
+    output::print_line(format!(
         "                    {} if no load lies within {margin_mm:.0} mm of an edge",
         ends(low_n, high_n, " N")
     ))?;
-    output::say(format!("centre of pressure  {}", interval(centre, "mm")))?;
+    output::print_line(format!("centre of pressure  {}", interval(centre, "mm")))?;
     if let Some(across) = &told.centre_y_mm {
-        output::say(format!("            across  {}", interval(across, "mm")))?;
+        output::print_line(format!("            across  {}", interval(across, "mm")))?;
     }
     if let Some(width_mm) = told.resolution_mm {
-        output::say(format!(
+        output::print_line(format!(
             "resolution          {width_mm:.0} mm, the median width of the averaging kernels"
         ))?;
     }
     let interval = |value: &Interval| format!("{:.3} ({})", value.value, ends(value.low, value.high, ""));
-    output::say(format!("\n{}", JsonPatch::columns(&told.patches, "patch", told.extent, interval)))?;
+    output::print_line(format!("\n{}", JsonPatch::columns(&told.patches, "patch", told.extent, interval)))?;
     if told.loads.is_empty() {
         return Ok(());
     }
     let number = |value: &f64| format!("{value:.3}");
-    output::say(format!("\n{}", JsonPatch::columns(&told.loads, "true load", told.extent, number)))
+    output::print_line(format!("\n{}", JsonPatch::columns(&told.loads, "true load", told.extent, number)))
 }
 
 fn ends(low: f64, high: f64, unit: &str) -> String {
@@ -234,10 +240,12 @@ struct JsonProfile {
     /// Line of the reading; null for a simulated one.
     line: Option<u64>,
     status: &'static str,
-    misfit: f64,
+    #[serde(rename = "misfit")]
+    chi_squared: f64,
     worst_misfit: f64,
     total_n: Interval,
-    seen: Seen,
+    #[serde(rename = "seen")]
+    interior: InteriorForce,
     centre_x_mm: Option<Interval>,
     #[serde(skip_serializing_if = "Option::is_none")]
     centre_y_mm: Option<Interval>,
@@ -254,7 +262,7 @@ struct JsonProfile {
 
 /// 95 % interval of the total force if no load lies within `margin_mm` of an edge.
 #[derive(Clone, Copy, serde::Serialize)]
-struct Seen {
+struct InteriorForce {
     margin_mm: f64,
     low_n: f64,
     high_n: f64,
@@ -276,7 +284,8 @@ struct JsonPatch<T> {
     centre_x_mm: T,
     /// Coordinates across the width of a plane.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
-    across: Option<Across<T>>,
+    #[serde(rename = "across")]
+    transverse: Option<TransverseFields<T>>,
     force_n: T,
     /// Least standard deviations for evenly loaded patches of this number and size.
     limit_x_mm: Option<f64>,
@@ -284,7 +293,7 @@ struct JsonPatch<T> {
 }
 
 #[derive(serde::Serialize)]
-struct Across<T> {
+struct TransverseFields<T> {
     stretch_y_mm: [f64; 2],
     centre_y_mm: T,
     limit_y_mm: Option<f64>,
@@ -324,10 +333,10 @@ impl JsonProfile {
         Self {
             line,
             status: profile.status.name(),
-            misfit: profile.misfit,
+            chi_squared: profile.chi_squared,
             worst_misfit: profile.worst_misfit,
             total_n: Interval::new(profile.total_n, profile.total_sd_n, profile.bounds.total_95_n, 1.0),
-            seen: Seen {
+            interior: InteriorForce {
                 margin_mm: profile.bounds.margin_m * 1e3,
                 low_n: profile.bounds.seen_95_n.0,
                 high_n: profile.bounds.seen_95_n.1,
@@ -378,7 +387,7 @@ impl<T> JsonPatch<T> {
         Self {
             stretch_mm: [from.x_m * 1e3, to.x_m * 1e3],
             centre_x_mm,
-            across: extent.if_plane(Across {
+            transverse: extent.if_plane(TransverseFields {
                 stretch_y_mm: [from.y_m * 1e3, to.y_m * 1e3],
                 centre_y_mm,
                 limit_y_mm: limit.map(|limit| limit.sd_y_m * 1e3),
@@ -394,8 +403,9 @@ impl<T> JsonPatch<T> {
             format!("{from:.0}–{to:.0}")
         }
         let limit = |limit: Option<f64>| limit.map_or_else(|| "–".to_owned(), |limit| format!("{limit:.3}"));
-        let across =
-            |row: &Self, of: &dyn Fn(&Across<T>) -> String| row.across.as_ref().map_or(String::new(), of);
+        let across = |row: &Self, of: &dyn Fn(&TransverseFields<T>) -> String| {
+            row.transverse.as_ref().map_or(String::new(), of)
+        };
         let table = Table::from_rows(rows.iter().zip(1..)).column(what, |(_, number)| number.to_string());
         let table = match extent {
             Extent::Line { .. } => table

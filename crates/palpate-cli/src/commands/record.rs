@@ -1,7 +1,7 @@
 //! `palpate record`: a session recorded into a file.
 
-use super::outlets::Outlets;
-use crate::failure::{Complaint, Failure};
+use super::sink_options::SinkOptions;
+use crate::failure::{Failure, UserError};
 use crate::progress::{self, interrupted};
 use crate::remark::{alert, remark};
 use crate::session::SessionOptions;
@@ -61,7 +61,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE.toml")]
     rules: Option<PathBuf>,
     #[command(flatten)]
-    outlets: Outlets,
+    outlets: SinkOptions,
 }
 
 const LOOK_EVERY: Duration = Duration::from_millis(20);
@@ -79,11 +79,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut session = arguments.session.session(&locator, &arguments.locator)?;
     session
         .set_columns(arguments.from.columns())
-        .map_err(|error| Complaint::new(format!("--from {}: {error}", arguments.from)))?;
+        .map_err(|error| UserError::new(format!("--from {}: {error}", arguments.from)))?;
     let mut sinks: Vec<Box<dyn Sink>> = vec![Box::new(Words)];
     let rules = rules::read(arguments.rules.as_deref(), session.extent())?;
     if let Some(path) = &arguments.rules {
-        rules::refuse_untold_forces(&rules, path, &locator)?;
+        rules::check_force_rules(&rules, path, &locator)?;
     }
     let RulesByAction { publishing, commanding, alarming } = rules.by_action();
     if let (None, Some(path)) = (&arguments.mqtt, &arguments.rules) {
@@ -92,14 +92,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut unpublished = None;
     if let Some(url) = &arguments.mqtt {
         let sink = MqttSink::new(url, session.channels(), session.extent(), publishing, to.clone());
-        let sink = sink.map_err(Complaint::new)?;
+        let sink = sink.map_err(UserError::new)?;
         unpublished = Some((url, sink.lost()));
         sinks.push(Box::new(sink));
     }
     // Kept until the end, as the outlet owns Foxglove's server.
     let outlets = arguments.outlets.open()?;
     for open in &outlets {
-        sinks.push(open(session.channels(), session.extent(), to.clone()).map_err(Complaint::new)?);
+        sinks.push(open(session.channels(), session.extent(), to.clone()).map_err(UserError::new)?);
     }
     let mut unprinted = None;
     if arguments.json {
@@ -107,11 +107,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         unprinted = Some(lines.failed());
         sinks.push(Box::new(lines));
     }
-    let source = Source::open(&arguments.from, Path::new(""), clock, to.clone()).map_err(Complaint::new)?;
+    let source = Source::open(&arguments.from, Path::new(""), clock, to.clone()).map_err(UserError::new)?;
     if !commanding.as_slice().is_empty() {
         let commander = source.commander().map_err(|error| {
             let complaint =
-                Complaint::new(format!("--from {}: --rules has a `command`: {error}", arguments.from));
+                UserError::new(format!("--from {}: --rules has a `command`: {error}", arguments.from));
             complaint.help("name a source with a way back, or remove rules with `command`")
         })?;
         sinks.push(Box::new(CommandSink::new(commanding, commander, to.clone())));
@@ -121,8 +121,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     sinks.push(Box::new(AlarmSink::new(alarms, to.clone())));
     let estimation = arguments.session.config().estimation;
     let recording = RecordingSwitch::new(&locator, estimation, &arguments.from.to_string(), to.clone());
-    let recording = recording.map_err(Complaint::new)?;
-    recording.begin(&arguments.out).map_err(Complaint::new)?;
+    let recording = recording.map_err(UserError::new)?;
+    recording.begin(&arguments.out).map_err(UserError::new)?;
     sinks.push(Box::new(recording.clone()));
     let stop = Stop::after(arguments.duration, to)?;
     let fault = pipeline::run(&mut session, clock, &from, &mut sinks);
@@ -167,7 +167,7 @@ fn finish(
     // A reader that closes the pipe needs no more output; the recording is complete.
     if let Some(error) = unprinted.filter(|error| error.kind() != std::io::ErrorKind::BrokenPipe) {
         alert!("{summary}");
-        return Err(output::unprinted(error));
+        return Err(output::print_failure(error));
     }
     if interrupted() {
         return Err(Failure::Interrupted(summary));
@@ -176,7 +176,7 @@ fn finish(
         remark!("{summary}");
         return Ok(());
     }
-    output::say(summary)
+    output::print_line(summary)
 }
 
 /// Ends a session with [`Input::Stop`] at a signal, or after a time in seconds.
@@ -197,7 +197,7 @@ impl Stop {
                 std::thread::sleep(LOOK_EVERY);
             }
         };
-        std::thread::Builder::new().name("stop".to_owned()).spawn(wait).map_err(Complaint::new)?;
+        std::thread::Builder::new().name("stop".to_owned()).spawn(wait).map_err(UserError::new)?;
         Ok(Self(done))
     }
 }

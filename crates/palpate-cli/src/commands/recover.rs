@@ -1,6 +1,6 @@
 //! `palpate recover`: an interrupted recording, rewritten in full.
 
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::json::object;
 use crate::output;
 use crate::remark::remark;
@@ -34,27 +34,27 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let Arguments { recording, out, .. } = arguments;
     Target::new(out, &Inputs::new([recording.as_path()]))?;
     if out.exists() {
-        let complaint = Complaint::new(format!("{} exists already", out.display()));
+        let complaint = UserError::new(format!("{} exists already", out.display()));
         return Err(complaint.help("name another file with --out").into());
     }
-    let recovery = recording::recover(recording, out).map_err(Complaint::new)?;
+    let recovery = recording::recover(recording, out).map_err(UserError::new)?;
     if recovery.was_whole {
         remark!("{} was not cut off", recording.display());
     }
-    if recovery.passed_over.foreign > 0 {
-        let foreign = format_count(recovery.passed_over.foreign);
+    if recovery.skipped.foreign > 0 {
+        let foreign = format_count(recovery.skipped.foreign);
         remark!("{foreign} messages on topics of other programs are skipped");
     }
     let (readings, messages) = (format_count(recovery.readings), format_count(recovery.messages));
     let summary = format!("{}: {readings} readings, {messages} messages", out.display());
-    let losses: Vec<String> = recovery.passed_over.loss().into_iter().chain(recovery.locator_fault).collect();
+    let losses: Vec<String> = recovery.skipped.loss().into_iter().chain(recovery.locator_fault).collect();
     if arguments.json {
-        output::say_json(&object! {
+        output::print_json(&object! {
             "palpate": env!("CARGO_PKG_VERSION"),
             "recording": out.display().to_string(),
             "readings": recovery.readings,
             "messages": recovery.messages,
-            "foreign_messages": recovery.passed_over.foreign,
+            "foreign_messages": recovery.skipped.foreign,
             "was_whole": recovery.was_whole,
             "losses": &losses,
         })?;
@@ -63,7 +63,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
     }
     if losses.is_empty() {
-        return output::say(summary);
+        return output::print_line(summary);
     }
     Err(Failure::DataLost(format!("{summary}; {}", losses.join("; "))))
 }

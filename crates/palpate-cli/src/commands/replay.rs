@@ -1,7 +1,7 @@
 //! `palpate replay`: locates the readings of a recording again.
 
-use crate::estimate_columns::{EstimateColumns, Guesses};
-use crate::failure::{Complaint, Failure};
+use crate::estimate_columns::{EstimateColumns, EstimateRows};
+use crate::failure::{Failure, UserError};
 use crate::progress::interrupted;
 use crate::remark::remark;
 use crate::session::SessionOptions;
@@ -9,7 +9,7 @@ use crate::{input, output};
 use palpate_estimators::estimate_record::EstimateRecord;
 use palpate_estimators::estimator::Locator;
 use palpate_live::frame::Channel;
-use palpate_live::input::{Arrival, Arrived};
+use palpate_live::input::{Arrival, TimedArrival};
 use palpate_live::recording::{Head, Playback, Recorded};
 use palpate_live::session::{Estimation, Output, Session};
 use palpate_live::stamp::Stamp;
@@ -58,7 +58,7 @@ struct Line {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let playback = Playback::open(&arguments.recording).map_err(Complaint::new)?;
+    let playback = Playback::open(&arguments.recording).map_err(UserError::new)?;
     if !playback.is_whole() {
         remark!("{} was cut off, or is being written; it is read up to there", arguments.recording.display());
     }
@@ -66,7 +66,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         None => {
             let path = &arguments.recording;
             let locator = playback.locator().map_err(|error| {
-                Complaint::new(error).help("--locator FILE locates its readings by another locator")
+                UserError::new(error).help("--locator FILE locates its readings by another locator")
             })?;
             (path, input::parse_locator(path, locator)?)
         }
@@ -76,7 +76,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             (path, locator)
         }
     };
-    let columns = EstimateColumns::new(&locator, Guesses::by_option(arguments.all));
+    let columns = EstimateColumns::new(&locator, EstimateRows::by_option(arguments.all));
     let printer =
         Printer { out: &mut std::io::stdout().lock(), columns: (!arguments.json).then_some(columns) };
     if arguments.locator.is_none() && arguments.session.config().estimation == Estimation::Single {
@@ -95,12 +95,12 @@ fn by_the_same(
 ) -> Result<(), Failure> {
     let extent = locator.setup.surface().extent();
     let follower = playback.head().estimation.follower(locator);
-    let mut follower = follower.map_err(|error| Complaint::about(&arguments.recording, error))?;
+    let mut follower = follower.map_err(|error| UserError::for_path(&arguments.recording, error))?;
     printer.begin()?;
     let (mut count, mut others) = (0_u64, 0_u64);
     let units = Channel::all_of(&locator.setup);
     let mut reading = Vec::new();
-    while let Some(recorded) = playback.next_recorded().map_err(Complaint::new)? {
+    while let Some(recorded) = playback.next_recorded().map_err(UserError::new)? {
         if let Recorded::Reading { values, .. } = recorded {
             // The board's number times its unit, bitwise equal to the reading.
             reading =
@@ -108,9 +108,9 @@ fn by_the_same(
             continue;
         }
         let Recorded::Estimate { number, unix_ns, located, estimate: before } = recorded else { continue };
-        let single = locator.locate(&located).map_err(Complaint::new)?;
+        let single = locator.locate(&located).map_err(UserError::new)?;
         let estimate = match &mut follower {
-            Some(follower) => follower.follow(unix_ns, &reading, &located, single),
+            Some(follower) => follower.update(unix_ns, &reading, &located, single),
             None => single,
         };
         let line =
@@ -147,12 +147,12 @@ fn by_another(
     let mut first_ns = None;
     let mut count = 0;
     let mut outputs = Vec::new();
-    while let Some(recorded) = playback.next_recorded().map_err(Complaint::new)? {
+    while let Some(recorded) = playback.next_recorded().map_err(UserError::new)? {
         let Recorded::Reading { unix_ns, values, .. } = recorded else { continue };
         let elapsed_ns = unix_ns.saturating_sub(*first_ns.get_or_insert(unix_ns));
         let at = Stamp { elapsed: Duration::from_nanos(elapsed_ns), unix_ns };
         let bytes = palpate_live::source::line(&values).into_bytes();
-        session.receive(&Arrived { at, arrival: Arrival::Bytes(bytes) }, &mut outputs);
+        session.receive(&TimedArrival { at, arrival: Arrival::Bytes(bytes) }, &mut outputs);
         for output in outputs.drain(..) {
             let Output::Sample(sample) = output else { continue };
             count += 1;
@@ -173,7 +173,7 @@ fn by_another(
 
 /// Fails if parts are unreadable or no `record` exists; reports other programs' messages.
 fn check_losses(arguments: &Arguments, playback: &Playback, count: u64, record: &str) -> Result<(), Failure> {
-    let passed_over = playback.passed_over();
+    let passed_over = playback.skipped();
     if passed_over.foreign > 0 {
         remark!("{} messages on topics of other programs are skipped", format_count(passed_over.foreign));
     }
@@ -200,7 +200,7 @@ fn check_channels(head: &Head, locator: &Locator) -> Result<(), Failure> {
     };
     let complaint =
         format!("the recording has the channels {}; the locator needs {}", shown(&there), shown(&wanted));
-    Err(Complaint::new(complaint).into())
+    Err(UserError::new(complaint).into())
 }
 
 fn is_the_same(estimate: &EstimateRecord, before: &Map<String, Value>) -> bool {
@@ -221,7 +221,7 @@ impl<W: std::io::Write> Printer<'_, W> {
 
     fn print(&mut self, line: &Line) -> Result<(), Failure> {
         let text = match self.columns {
-            None => serde_json::to_string(line).map_err(Complaint::new)? + "\n",
+            None => serde_json::to_string(line).map_err(UserError::new)? + "\n",
             Some(columns) => {
                 columns.row(vec![line.number.to_string(), format!("{:.6}", line.time_s)], &line.estimate)
             }

@@ -5,7 +5,7 @@
 //! seeds.
 
 use super::simulate::simulated_csv;
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::input;
 use crate::json::object;
 use crate::output;
@@ -66,7 +66,7 @@ impl SampleBench {
             Ok(Files { rig: rig.to_owned(), presses, touches })
         };
         let recorded = |presses: &[u8], touches: &[u8]| {
-            let first = FirstRig::guess(presses_name, presses, &Hints::default()).map_err(Complaint::new)?;
+            let first = FirstRig::infer(presses_name, presses, &Hints::default()).map_err(UserError::new)?;
             Ok(Files { rig: first.to_toml(rig_name), presses: presses.to_vec(), touches: touches.to_vec() })
         };
         match self {
@@ -139,7 +139,7 @@ pub fn run(request: &Request) -> Result<(), Failure> {
     let paths = Paths::new(bench, folder);
     let written = [&paths.rig, &paths.presses, &paths.touches];
     if let (false, Some(path)) = (overwrite, written.iter().find(|path| path.exists())) {
-        let complaint = Complaint::new(format!("{} already exists", path.display()));
+        let complaint = UserError::new(format!("{} already exists", path.display()));
         return Err(complaint.help("name another folder, or overwrite its files by --overwrite").into());
     }
     let files = bench.files(&file_name(&paths.rig), &file_name(&paths.presses))?;
@@ -151,7 +151,7 @@ pub fn run(request: &Request) -> Result<(), Failure> {
     }
     let commands = bench.next_commands(&paths);
     if json {
-        return output::say_json(&object! {
+        return output::print_json(&object! {
             "palpate": env!("CARGO_PKG_VERSION"),
             "rig": paths.rig.display().to_string(),
             "files": written.map(|path| path.display().to_string()),
@@ -159,10 +159,10 @@ pub fn run(request: &Request) -> Result<(), Failure> {
         });
     }
     for path in written {
-        output::say(path.display())?;
+        output::print_line(path.display())?;
     }
-    output::say("Next:")?;
-    commands.iter().try_for_each(|command| output::say(format!("  {command}")))
+    output::print_line("Next:")?;
+    commands.iter().try_for_each(|command| output::print_line(format!("  {command}")))
 }
 
 fn file_name(path: &Path) -> String {

@@ -1,9 +1,9 @@
 //! `palpate serve`: a session for browsers.
 
-use super::calibrate::{OperatorOptions, about_journal, pressed_before, pressed_for, stage};
-use super::outlets::Outlets;
+use super::calibrate::{OperatorOptions, journal_failure, journal_heading, load_presses, stage};
 use super::record::Words;
-use crate::failure::{Complaint, Failure};
+use super::sink_options::SinkOptions;
+use crate::failure::{Failure, UserError};
 use crate::input::{self, RigOrLocator};
 use crate::progress::{self, Observer};
 use crate::remark::{alert, remark};
@@ -94,7 +94,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME")]
     host_name: Vec<String>,
     #[command(flatten)]
-    outlets: Outlets,
+    outlets: SinkOptions,
     /// Seed of fits and simulations
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -134,7 +134,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(plan) => {
             let extent = plan.rig.setup.surface().extent();
             let rules = rules_of(arguments, extent)?;
-            let alarms = kept_alarms(arguments, &rules, extent)?;
+            let alarms = load_stored_alarms(arguments, &rules, extent)?;
             let clock = HostClock::with_speed(arguments.clock_speed);
             let live = Live::calibrating(plan, PathBuf::new(), clock);
             with_rules(configured(live, arguments), rules, alarms)
@@ -148,9 +148,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let server =
         Server::start(arguments.listen, access, Arc::clone(&live)).map_err(|error| match &error {
             ServerError::Listen { .. } => {
-                Complaint::new(&error).help("--listen 127.0.0.1:0 takes a port that is free")
+                UserError::new(&error).help("--listen 127.0.0.1:0 takes a port that is free")
             }
-            ServerError::Run(_) => Complaint::new(&error),
+            ServerError::Run(_) => UserError::new(&error),
         })?;
     let has_subject = arguments.locator.is_some() || arguments.from.is_none();
     if !arguments.calibrate && has_subject {
@@ -177,7 +177,7 @@ fn check_folder(folder: &Path) -> Result<(), Failure> {
     match folder.ancestors().find(is_there) {
         Some(found) if !found.as_os_str().is_empty() && !found.is_dir() => {
             let complaint =
-                Complaint::new(format!("--record {}: {} is not a folder", folder.display(), found.display()));
+                UserError::new(format!("--record {}: {} is not a folder", folder.display(), found.display()));
             Err(complaint.help("name the folder that recordings go into").into())
         }
         _ => Ok(()),
@@ -187,11 +187,11 @@ fn check_folder(folder: &Path) -> Result<(), Failure> {
 /// Serves a board without a rig, which browsers make and calibrate.
 fn bringing_up(from: &SourceUrl, arguments: &Arguments) -> Result<Live, Failure> {
     if let Some(path) = &arguments.rules {
-        let complaint = Complaint::new(format!("--rules {}: rules need a locator", path.display()));
+        let complaint = UserError::new(format!("--rules {}: rules need a locator", path.display()));
         return Err(complaint.help("name the locator, or omit --rules").into());
     }
     let live = Live::bringing_up(from.clone(), PathBuf::new())
-        .map_err(|error| Complaint::new(error).help("--from names the source"))?;
+        .map_err(|error| UserError::new(error).help("--from names the source"))?;
     Ok(configured(live, arguments))
 }
 
@@ -204,12 +204,12 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
     // Read before a fit, which may take long.
     let extent = read.setup().surface().extent();
     let rules = rules_of(arguments, extent)?;
-    let alarms = kept_alarms(arguments, &rules, extent)?;
+    let alarms = load_stored_alarms(arguments, &rules, extent)?;
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let (locator, simulated) = match read {
         RigOrLocator::Locator(locator) => {
             if arguments.data.is_some() {
-                let complaint = Complaint::about(path, "--data is for rigs, and this is a locator");
+                let complaint = UserError::for_path(path, "--data is for rigs, and this is a locator");
                 return Err(complaint.help("leave --data out").into());
             }
             (*locator, None)
@@ -222,11 +222,12 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
         }
     };
     if let Some(path) = &arguments.rules {
-        rules::refuse_untold_forces(&rules.commanding, path, &locator)?;
-        rules::refuse_untold_forces(&rules.alarming, path, &locator)?;
+        rules::check_force_rules(&rules.commanding, path, &locator)?;
+        rules::check_force_rules(&rules.alarming, path, &locator)?;
     }
-    if let Some(KeptAlarms { file, rules, .. }) = &alarms {
-        let about = |problem| Complaint::about(file.path(), problem).help("correct the file, or remove it");
+    if let Some(StoredAlarms { file, rules, .. }) = &alarms {
+        let about =
+            |problem| UserError::for_path(file.path(), problem).help("correct the file, or remove it");
         rules.check_alarms(&locator).map_err(about)?;
     }
     if let Err(error) = locator.tare() {
@@ -247,32 +248,32 @@ fn rules_of(arguments: &Arguments, extent: Extent) -> Result<RulesByAction, Fail
     Ok(rules)
 }
 
-fn with_rules(live: Live, rules: RulesByAction, alarms: Option<KeptAlarms>) -> Live {
+fn with_rules(live: Live, rules: RulesByAction, alarms: Option<StoredAlarms>) -> Live {
     let live = live.with_commands(rules.commanding);
     match alarms {
-        Some(KeptAlarms { file, text, rules }) => live.with_alarm_file(file, text, rules),
+        Some(StoredAlarms { file, text, rules }) => live.with_alarm_file(file, text, rules),
         None => live.with_alarms(rules.alarming),
     }
 }
 
-struct KeptAlarms {
+struct StoredAlarms {
     file: AlarmFile,
     text: String,
     rules: Rules,
 }
 
 /// Alarms beside the locator or in the folder of recordings; `None` with --rules or without a file.
-fn kept_alarms(
+fn load_stored_alarms(
     arguments: &Arguments,
     rules: &RulesByAction,
     extent: Extent,
-) -> Result<Option<KeptAlarms>, Failure> {
-    let beside = arguments.out.as_ref().or(arguments.locator.as_ref()).map(|path| AlarmFile::beside(path));
+) -> Result<Option<StoredAlarms>, Failure> {
+    let beside = arguments.out.as_ref().or(arguments.locator.as_ref()).map(|path| AlarmFile::for_path(path));
     let in_folder = || arguments.record.as_ref().map(|folder| AlarmFile::in_folder(folder));
     let Some(file) = beside.or_else(in_folder).filter(|_| rules.alarming.as_slice().is_empty()) else {
         return Ok(None);
     };
-    let text = file.read().map_err(|error| Complaint::about(file.path(), error))?;
+    let text = file.read().map_err(|error| UserError::for_path(file.path(), error))?;
     let rules = match text.trim() {
         "" => Rules::default(),
         _ => rules::read(Some(file.path()), extent)?,
@@ -280,7 +281,7 @@ fn kept_alarms(
     if !rules.as_slice().is_empty() {
         remark!("alarms of {}", file.path().display());
     }
-    Ok(Some(KeptAlarms { file, text, rules }))
+    Ok(Some(StoredAlarms { file, text, rules }))
 }
 
 fn configured(live: Live, arguments: &Arguments) -> Live {
@@ -302,14 +303,14 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
     } = arguments
     else {
         return match arguments.operator.given() {
-            Some(option) => Err(Complaint::new(format!("{option} is for a calibration"))
+            Some(option) => Err(UserError::new(format!("{option} is for a calibration"))
                 .help("add --calibrate with --presses and --out, or omit it")
                 .into()),
             None => Ok(None),
         };
     };
     if !input::is_toml(path) {
-        let complaint = Complaint::about(path, "--calibrate is for rigs, and this is a locator");
+        let complaint = UserError::for_path(path, "--calibrate is for rigs, and this is a locator");
         return Err(complaint.help("name the rig that is to be calibrated").into());
     }
     let inputs = Inputs::new([path.as_path()]);
@@ -319,19 +320,19 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
     // An impossible calibration is refused here, where its place in the file is known.
     let stage = stage(path, &rig, arguments.machine(), arguments.force)?;
     let depths = DepthKnowledge::for_stage(stage.as_ref());
-    let (before, in_file_m) = pressed_before(path, &rig, presses, depths)?;
+    let (before, in_file_m) = load_presses(path, &rig, presses, depths)?;
     let depths_m = stage.as_ref().map_or(&[][..], |stage| &stage.depths_m);
     let stated = arguments.operator.statements();
     let statements = match &stage {
-        None => stated.or_known(&rig, arguments.force, in_file_m, &before),
+        None => stated.with_known_values(&rig, arguments.force, in_file_m, &before),
         // The rig's placement error is that of a person.
         Some(_) => stated,
     };
     plan(&rig, statements.weights(arguments.force), depths_m, &before)
-        .map_err(|error| Complaint::about(path, error))?;
-    let comment = pressed_for(path);
+        .map_err(|error| UserError::for_path(path, error))?;
+    let comment = journal_heading(path);
     Journal::new(&rig.setup, presses, comment.clone(), Vec::new(), depths)
-        .map_err(|error| about_journal(path, &error))?;
+        .map_err(|error| journal_failure(path, &error))?;
     Ok(Some(CalibrationPlan {
         rig,
         from: from.clone(),
@@ -350,7 +351,7 @@ fn fitted(rig: &Rig, path: &Path, arguments: &Arguments) -> Result<Locator, Fail
     if let Estimator::Auto(Auto { only }) = &rig.estimator
         && only.is_empty()
     {
-        let complaint = Complaint::about(path, "the estimator is `auto`, and its choice may take minutes");
+        let complaint = UserError::for_path(path, "the estimator is `auto`, and its choice may take minutes");
         return Err(complaint
             .help("name its candidates by `only`, or `palpate fit` it once and serve the locator")
             .into());
@@ -361,7 +362,7 @@ fn fitted(rig: &Rig, path: &Path, arguments: &Arguments) -> Result<Locator, Fail
             let simulated =
                 Observer::of_stages().watch(|watch| rig.simulate_calibration_watched(arguments.seed, watch));
             simulated.map_err(|error| {
-                let about = |error| Complaint::about(path, error);
+                let about = |error| UserError::for_path(path, error);
                 Failure::of_work(error, |error| {
                     about(error).help("--data names a recording to fit; --calibrate makes one in the browser")
                 })
@@ -369,7 +370,7 @@ fn fitted(rig: &Rig, path: &Path, arguments: &Arguments) -> Result<Locator, Fail
         }
     };
     let needed = rig.estimator.positions_needed();
-    recording.check_distinct_positions(needed).map_err(Complaint::new)?;
+    recording.check_distinct_positions(needed).map_err(UserError::new)?;
     let task = FitTask::new(&rig.setup, &recording).seed(arguments.seed);
     Observer::of_rounds(rig.estimator.most_rounds())
         .watch(|watch| rig.estimator.fit_task(task.watch(watch)))
@@ -387,7 +388,7 @@ fn begin(live: &Live, arguments: &Arguments) -> Result<(), Failure> {
             Ok(())
         }
     };
-    begun.map_err(|error: LiveError| Complaint::new(error).help("--from names the source").into())
+    begun.map_err(|error: LiveError| UserError::new(error).help("--from names the source").into())
 }
 
 fn refused(error: AccessError) -> Failure {
@@ -395,14 +396,14 @@ fn refused(error: AccessError) -> Failure {
         AccessError::NoToken { .. } => "--token auto makes one up; or listen at 127.0.0.1",
         AccessError::Token { .. } => "--token auto makes one up",
     };
-    Complaint::new(error).help(help).into()
+    UserError::new(error).help(help).into()
 }
 
 /// Returns 128 random bits in hexadecimal digits.
 fn made_up_token() -> Result<String, Failure> {
     let mut bytes = [0; 16];
     getrandom::fill(&mut bytes).map_err(|error| {
-        Complaint::new(format!("no random numbers for a token: {error}")).help("give one")
+        UserError::new(format!("no random numbers for a token: {error}")).help("give one")
     })?;
     Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }

@@ -1,6 +1,6 @@
 //! `palpate simulate`: a recording from the model.
 
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::json::object;
 use crate::progress::Observer;
 use crate::target::{Inputs, Target};
@@ -60,9 +60,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (recording, csv) = simulated_csv(&rig, &arguments.rig, arguments.every, arguments.seed)?;
     out.write(&csv)?;
     if arguments.json {
-        return output::say_json(&result(arguments, &recording, None, None));
+        return output::print_json(&result(arguments, &recording, None, None));
     }
-    output::say(format!(
+    output::print_line(format!(
         "{} rows, {} channels: {}",
         recording.rows.len(),
         recording.channels.len(),
@@ -82,7 +82,7 @@ pub fn simulated_csv(
         None => observer.watch(|watch| rig.simulate_watched(seed, watch)),
         Some(every_m) => {
             let repeats = rig.training.as_ref().map_or(1, |training| training.repeats);
-            let setup = rig.pressed_setup().map_err(|error| Complaint::about(path, error))?;
+            let setup = rig.training_setup().map_err(|error| UserError::for_path(path, error))?;
             let positions = every(rig.setup.surface().extent(), every_m).map_err(too_many)?;
             let simulate = |watch: Watch| simulate_at_watched(&setup, &positions, repeats, seed, watch);
             observer.watch(simulate).map_err(RigSimulationError::from)
@@ -90,17 +90,17 @@ pub fn simulated_csv(
     };
     drop(observer);
     let recording =
-        recording.map_err(|error| Failure::of_work(error, |error| Complaint::about(path, error)))?;
+        recording.map_err(|error| Failure::of_work(error, |error| UserError::for_path(path, error)))?;
     let mut csv = Vec::new();
     let comment = comment_with_placement(&comment(path, seed), recording.provenance.placement_sd_m);
-    recording::write(&recording, rig.setup.surface().extent(), &comment, &mut csv).map_err(Complaint::new)?;
+    recording::write(&recording, rig.setup.surface().extent(), &comment, &mut csv).map_err(UserError::new)?;
     Ok((recording, csv))
 }
 
 fn move_contact(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(), Failure> {
     let timed = Observer::of_stages()
         .watch(|watch| rig.simulate_moving_watched(arguments.seed, watch))
-        .map_err(|error| Failure::of_work(error, |error| Complaint::about(&arguments.rig, error)))?;
+        .map_err(|error| Failure::of_work(error, |error| UserError::for_path(&arguments.rig, error)))?;
     let mut csv = Vec::new();
     let swings = rig.motion.is_some_and(|moving| moving.beam.is_some());
     let how = if swings { "" } else { ", in balance at every reading, without inertia" };
@@ -112,7 +112,7 @@ fn move_contact(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(), Fa
     let seconds = timed.times_s.last().copied().unwrap_or(0.0);
     let beam = rig.motion.and_then(|moving| moving.beam);
     if arguments.json {
-        return output::say_json(&result(arguments, &timed.recording, Some(seconds), beam.as_ref()));
+        return output::print_json(&result(arguments, &timed.recording, Some(seconds), beam.as_ref()));
     }
     let mut told = format!("{rows} rows in {seconds:.3} s: {}", arguments.out.display());
     match beam {
@@ -125,7 +125,7 @@ fn move_contact(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(), Fa
         }
         None => told += "\nthe plate is in balance at every reading: its inertia is neglected",
     }
-    output::say(told)
+    output::print_line(told)
 }
 
 fn result(
@@ -151,9 +151,9 @@ fn comment(rig: &Path, seed: u64) -> String {
     format!("palpate {}, simulated from {}, seed {seed}", env!("CARGO_PKG_VERSION"), rig.display())
 }
 
-fn too_many(EveryError { count, .. }: EveryError) -> Complaint {
+fn too_many(EveryError { count, .. }: EveryError) -> UserError {
     let count = if count < 1e15 { count.to_string() } else { format!("{count:.1e}") };
-    Complaint::new(format!(
+    UserError::new(format!(
         "--every makes {count} positions; there must be at least 1 and at most {}",
         EveryError::MOST
     ))

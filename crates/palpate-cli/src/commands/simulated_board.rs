@@ -1,6 +1,6 @@
 //! `palpate simulated-board`: a board without hardware.
 
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::progress::interrupted;
 use crate::remark::{alert, remark};
 use crate::{input, output, stdout};
@@ -145,26 +145,26 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut finger = Finger::random(&rig, arguments.seed);
     if let Some(path) = &arguments.finger {
         finger =
-            finger.with_script(&input::read_text(path)?).map_err(|error| Complaint::about(path, error))?;
+            finger.with_script(&input::read_text(path)?).map_err(|error| UserError::for_path(path, error))?;
     }
     let load_cell = load_cell(arguments, &rig)?;
     let frames = match arguments.frames {
         FrameName::Binary => FrameForm::Binary { clock_ppm: arguments.clock_ppm },
         FrameName::Text if arguments.clock_ppm == 0.0 => FrameForm::Text,
         FrameName::Text => {
-            let complaint = Complaint::new("--clock-ppm needs binary frames: text frames carry no time");
+            let complaint = UserError::new("--clock-ppm needs binary frames: text frames carry no time");
             return Err(complaint.help("add --frames binary").into());
         }
     };
     let config = BoardConfig { rate_hz: arguments.rate, seed: arguments.seed, load_cell, frames };
     let board = SimulatedBoard::new(&rig.setup, &config, finger)
         .and_then(|board| board.with_faults(arguments.faults(&rig), arguments.seed))
-        .map_err(|error| Complaint::about(&arguments.rig, error))?;
+        .map_err(|error| UserError::for_path(&arguments.rig, error))?;
     #[cfg(feature = "gcode")]
     let machine = machine(arguments, &rig)?;
-    let link = Link::open(&arguments.to).map_err(Complaint::new)?;
+    let link = Link::open(&arguments.to).map_err(UserError::new)?;
     alert!("{}", link.name());
-    Plugged {
+    ConnectedBoard {
         board,
         link,
         #[cfg(feature = "gcode")]
@@ -216,20 +216,20 @@ fn load_cell(arguments: &Arguments, rig: &Rig) -> Result<Option<LoadCell>, Failu
         Some(name) => Ok(Some(LoadCell { name, noise_n })),
         None => {
             let complaint = "--load-cell needs the name of its values, `load_cell` of the rig's [stage]";
-            Err(Complaint::about(&arguments.rig, complaint).into())
+            Err(UserError::for_path(&arguments.rig, complaint).into())
         }
     }
 }
 
 #[cfg(feature = "gcode")]
-fn machine(arguments: &Arguments, rig: &Rig) -> Result<Option<PluggedMachine>, Failure> {
+fn machine(arguments: &Arguments, rig: &Rig) -> Result<Option<ConnectedMachine>, Failure> {
     let Some(url) = &arguments.stage else { return Ok(None) };
     if !matches!(url, LinkUrl::Pty(_) | LinkUrl::Tcp(_)) {
-        let complaint = Complaint::new(format!("--stage {url}: a machine answers what it is sent"));
+        let complaint = UserError::new(format!("--stage {url}: a machine answers what it is sent"));
         return Err(complaint.help("give it a way back: pty, pty:PATH or tcp://:PORT").into());
     }
     let Some(stage) = &rig.stage else {
-        return Err(Complaint::about(&arguments.rig, "--stage needs the rig's section [stage]").into());
+        return Err(UserError::for_path(&arguments.rig, "--stage needs the rig's section [stage]").into());
     };
     let force_n = rig.training.as_ref().and_then(|training| training.force_n).or(rig.setup.force_n());
     let firmware = match arguments.firmware {
@@ -240,13 +240,13 @@ fn machine(arguments: &Arguments, rig: &Rig) -> Result<Option<PluggedMachine>, F
     let config = arguments.machine.clone().unwrap_or_default();
     let machine =
         SimulatedMachine::with_config(firmware, stage.clone(), extent, force_n.unwrap_or(1.0), config);
-    let link = Link::open(url).map_err(Complaint::new)?;
+    let link = Link::open(url).map_err(UserError::new)?;
     alert!("a machine of {} firmware at {}", firmware.name(), link.name());
-    Ok(Some(PluggedMachine { machine, link, was_there: false, was_stopped: false }))
+    Ok(Some(ConnectedMachine { machine, link, was_there: false, was_stopped: false }))
 }
 
 #[cfg(feature = "gcode")]
-struct PluggedMachine {
+struct ConnectedMachine {
     machine: SimulatedMachine,
     link: Link,
     was_there: bool,
@@ -254,7 +254,7 @@ struct PluggedMachine {
 }
 
 #[cfg(feature = "gcode")]
-impl PluggedMachine {
+impl ConnectedMachine {
     fn work(&mut self, now: Duration) -> std::io::Result<()> {
         self.machine.advance_to(now);
         let Some(bytes) = self.link.bytes()? else {
@@ -278,16 +278,16 @@ impl PluggedMachine {
     }
 }
 
-struct Plugged<'a> {
+struct ConnectedBoard<'a> {
     board: SimulatedBoard<'a>,
     link: Link,
     #[cfg(feature = "gcode")]
-    machine: Option<PluggedMachine>,
+    machine: Option<ConnectedMachine>,
     away_until: Option<Duration>,
     commands: u64,
 }
 
-impl Plugged<'_> {
+impl ConnectedBoard<'_> {
     fn run(mut self, arguments: &Arguments) -> Result<(), Failure> {
         let clock = HostClock::with_speed(arguments.clock_speed);
         let every = arguments.disconnect_every.map(Duration::from_secs_f64);
@@ -299,14 +299,14 @@ impl Plugged<'_> {
             if interrupted() || is_over {
                 return self.finish(unsent);
             }
-            self.obey(now)?;
-            while let Some(news) = self.link.news() {
+            self.execute_commands(now)?;
+            while let Some(news) = self.link.next_message() {
                 remark!("{news}");
             }
             #[cfg(feature = "gcode")]
             if let Some(machine) = &mut self.machine {
-                machine.work(now).map_err(Complaint::new)?;
-                self.board.finger_mut().hold(machine.machine.contact());
+                machine.work(now).map_err(UserError::new)?;
+                self.board.finger_mut().set_contact(machine.machine.contact());
             }
             if next_disconnect.is_some_and(|at| now >= at) {
                 next_disconnect = every.map(|every| now + every);
@@ -320,7 +320,7 @@ impl Plugged<'_> {
                 match self.board.next_frame() {
                     Some(_) if self.away_until.is_some() => unsent += 1,
                     Some(frame) => {
-                        self.link.send(&frame).map_err(|error| crate::output::unprinted(&error))?;
+                        self.link.send(&frame).map_err(|error| crate::output::print_failure(&error))?;
                     }
                     None => {}
                 }
@@ -330,15 +330,15 @@ impl Plugged<'_> {
         }
     }
 
-    fn obey(&mut self, now: Duration) -> Result<(), Failure> {
+    fn execute_commands(&mut self, now: Duration) -> Result<(), Failure> {
         for line in self.link.lines() {
             let line = line.trim();
             if line == "disconnect" {
                 self.disconnect(now)?;
-            } else if !Finger::knows(line) {
+            } else if !Finger::is_command(line) {
                 self.commands += 1;
                 remark!("command {}: {line}", self.commands);
-            } else if let Err(problem) = self.board.finger_mut().obey(line) {
+            } else if let Err(problem) = self.board.finger_mut().execute(line) {
                 alert!("`{line}`: {problem}");
             }
         }
@@ -346,7 +346,7 @@ impl Plugged<'_> {
     }
 
     fn disconnect(&mut self, now: Duration) -> Result<(), Failure> {
-        self.link.disconnect().map_err(Complaint::new)?;
+        self.link.disconnect().map_err(UserError::new)?;
         self.away_until = Some(now + AWAY);
         Ok(())
     }

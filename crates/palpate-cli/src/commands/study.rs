@@ -1,6 +1,6 @@
 //! `palpate study`: a set of experiments; the founding paper's is built in.
 
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::output::Table;
 use crate::progress::Observer;
 use crate::target::{Inputs, NETWORKS_CSV, OF_A_STUDY, REPORT_HTML, RESULTS_JSON, SHARD_JSON, TargetFolder};
@@ -12,8 +12,8 @@ use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{StudyReport, paper_report, study_report};
 use palpate_studies::paper::{Agreement, PublishedFigure, STUDY_TOML, claims, published_figures};
 use palpate_studies::{
-    ArmResults, Checkpoint, PreparedStudy, ResultsFile, RunFacts, RunOptions, Shard, Study, StudyResults,
-    StudyRunError, StudyTables, Task, Trained,
+    ArmFit, ArmResults, Checkpoint, PreparedStudy, ResultsFile, RunFacts, RunOptions, Shard, Study,
+    StudyResults, StudyRunError, StudyTables, Task,
 };
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -101,7 +101,7 @@ impl Arguments {
                 SHARD_JSON => format!("{} contains a finished shard", out.display()),
                 table => format!("{} belongs to an unfinished run", out.join(table).display()),
             };
-            let complaint = Complaint::new(complaint);
+            let complaint = UserError::new(complaint);
             return Err(match self.merge.is_empty() {
                 true => complaint
                     .help("--resume continues it, --overwrite deletes it, --out names another folder"),
@@ -111,14 +111,14 @@ impl Arguments {
         }
         if self.shard.is_some() && out.join(REPORT_HTML).exists() {
             let complaint =
-                Complaint::new(format!("{} contains a report, and a shard writes none", out.display()));
+                UserError::new(format!("{} contains a report, and a shard writes none", out.display()));
             return Err(complaint.help("--out names another folder").into());
         }
         Ok(folder)
     }
 }
 
-struct Asked<'a> {
+struct StudyRequest<'a> {
     arguments: &'a Arguments,
     is_paper: bool,
     name: String,
@@ -138,7 +138,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         (arguments.study.display().to_string(), input::read_text(&arguments.study)?)
     };
     let study = input::parse_study(&name, &text)?;
-    let asked = Asked { arguments, is_paper, name, text };
+    let asked = StudyRequest { arguments, is_paper, name, text };
     if !arguments.merge.is_empty() {
         return shards::merge(&asked, study);
     }
@@ -159,7 +159,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-impl Asked<'_> {
+impl StudyRequest<'_> {
     fn prepare(&self, study: Study) -> Result<PreparedStudy, Failure> {
         let prepared = Observer::of_stages().watch(|watch| PreparedStudy::new(study, watch));
         prepared.map_err(|error| complaint(&error, &self.name, &self.text))
@@ -168,7 +168,7 @@ impl Asked<'_> {
     fn finish(
         &self,
         prepared: &PreparedStudy,
-        fits: Vec<Trained>,
+        fits: Vec<ArmFit>,
         facts: &RunFacts,
         out: &TargetFolder,
     ) -> Result<(), Failure> {
@@ -178,20 +178,20 @@ impl Asked<'_> {
             run: facts,
             results: &results,
             published: self.is_paper.then(|| published_figures(&results)),
-            claims: self.is_paper.then(|| claims(&outcomes, prepared.judging())),
+            claims: self.is_paper.then(|| claims(&outcomes, prepared.evaluation_settings())),
         };
         let report = StudyReport { study: prepared, outcomes: &outcomes, results: &results, run: facts };
         out.write_report(if self.is_paper { paper_report(&report) } else { study_report(&report) })?;
         out.write(RESULTS_JSON, (output::to_json(&file)? + "\n").as_bytes())?;
         if self.arguments.json {
-            return output::say_json(&file);
+            return output::print_json(&file);
         }
         print_tables(&file, out.path())
     }
 }
 
 fn complaint(error: &StudyRunError, name: &str, text: &str) -> Failure {
-    let complaint = Complaint::new(error);
+    let complaint = UserError::new(error);
     match error {
         StudyRunError::Cancelled(_) => Failure::stopped(),
         StudyRunError::Design { span, error, .. } => {
@@ -211,13 +211,13 @@ fn train(
     options: RunOptions,
     tables: &StudyTables,
     (out, arguments): (&TargetFolder, &Arguments),
-) -> Result<(Vec<Trained>, RunFacts), Failure> {
+) -> Result<(Vec<ArmFit>, RunFacts), Failure> {
     out.make()?;
     let earlier = match arguments.earlier_run() {
         EarlierRun::Resume => fits::read(out, tables)?,
         EarlierRun::Leave | EarlierRun::Overwrite => Checkpoint::default(),
     };
-    fits::say_surplus(&earlier.done, options);
+    fits::print_surplus(&earlier.done, options);
     let mut fits = earlier.done;
     let files = FitFiles::begin(out, tables, &fits)?;
     let tasks = tables.tasks(options.seeds);
@@ -236,7 +236,7 @@ fn train(
             path.display()
         )));
     }
-    let fitted = fitted.map_err(Complaint::new)?;
+    let fitted = fitted.map_err(UserError::new)?;
     let presentations = fitted.iter().map(|fit| prepared.presentations(fit)).sum();
     let arithmetic = format!("{}, {} lanes", InstructionSet::best(), prepared.lanes());
     fits.extend(fitted);
@@ -245,40 +245,40 @@ fn train(
 }
 
 fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
-    output::say("Medians over the seeds (5th to 95th percentile)\n")?;
-    output::say(arms_table(&file.results.arms))?;
+    output::print_line("Medians over the seeds (5th to 95th percentile)\n")?;
+    output::print_line(arms_table(&file.results.arms))?;
     if let Some(figures) = &file.published {
         let Agreement { agreeing, within_seeds, compared } = Agreement::new(figures);
-        output::say(format!(
+        output::print_line(format!(
             "\nPublished against replicated: {agreeing} of {compared} agree with our medians, as far as was fixed beforehand; \
              {within_seeds} lie within 5–95 % of our seeds\n"
         ))?;
         let show = |figure: &PublishedFigure, value: f64| {
-            if figure.found.median >= 1000.0 { whole(value) } else { format!("{value:.2}") }
+            if figure.result.median >= 1000.0 { whole(value) } else { format!("{value:.2}") }
         };
-        output::say(
+        output::print_line(
             Table::from_rows(figures)
-                .column("figure", |figure| format!("{}: {}", figure.arm, figure.what))
+                .column("figure", |figure| format!("{}: {}", figure.arm, figure.label))
                 .column("published", |figure| show(figure, figure.published))
-                .column("ours", |figure| in_words(figure.found, |value| show(figure, value)))
+                .column("ours", |figure| in_words(figure.result, |value| show(figure, value)))
                 .column("agrees if within", |figure| {
-                    figure.yardstick.in_words(&show(figure, figure.published))
+                    figure.criterion.in_words(&show(figure, figure.published))
                 })
                 .column("agrees", |figure| yes_or_no(figure.agrees))
                 .column("in 5–95 %", |figure| yes_or_no(figure.within_seeds)),
         )?;
     }
     if let Some(claims) = &file.claims {
-        output::say("\nThe paper's claims, in the medians and in the share of single seeds\n")?;
-        output::say(
+        output::print_line("\nThe paper's claims, in the medians and in the share of single seeds\n")?;
+        output::print_line(
             Table::from_rows(claims)
                 .column("claim", |claim| format!("{} {}", claim.id, short(claim.claim)))
                 .column("verdict", |claim| if claim.holds { "holds" } else { "DOES NOT HOLD" }.to_owned())
                 .column("seeds", |claim| format!("{:.0} %", 100.0 * claim.share_of_seeds)),
         )?;
     }
-    output::say(time_in_words(file.run))?;
-    output::say_report("", Some(out))
+    output::print_line(time_in_words(file.run))?;
+    output::print_report_path("", Some(out))
 }
 
 /// Formats "40 s on 2 threads, 12.3 M presentations/s (AVX2, 8 lanes)".

@@ -1,16 +1,16 @@
 //! `palpate track`: moving contacts, line by line or smoothed.
 
 use crate::contact_lines::ContactLines;
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::json::{Fields, Object, fields, object};
 use crate::lines::{Lines, Parsing, Records};
 use crate::output::Table;
 use crate::remark::remark;
-use crate::tare::{Taken, TareOption, Taring};
+use crate::tare::{TareOption, TareOutcome, Taring};
 use crate::target::{Inputs, TargetFolder};
 use crate::{input, output};
 use palpate_estimators::estimator::{
-    Across, Locator, SmoothTracker, Swing, Track, Tracked, Tracker, TrackerConfig,
+    Locator, SmoothTracker, Swing, Track, TrackedContact, Tracker, TrackerConfig, TransverseMotion,
 };
 use palpate_estimators::recording::{LineParser, TimedParser, TimedReading, csv_row};
 use palpate_estimators::track_errors::{SpeedErrors, TrackErrors, sweep_speeds};
@@ -85,7 +85,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let own =
         beam.map(|beam| Swing { frequency_hz: beam.frequency_hz(1), damping_ratio: beam.damping_ratio() });
     let config = TrackerConfig { swing: told.or(own), ..TrackerConfig::default() };
-    let tracking = locator.tracking(&config).map_err(|error| Complaint::about(&arguments.locator, error))?;
+    let tracking =
+        locator.tracking(&config).map_err(|error| UserError::for_path(&arguments.locator, error))?;
     let extent = tracking.likelihood().extent();
     let format = match (arguments, extent, tracking.likelihood().most_contacts()) {
         (Arguments { json: true, .. }, ..) => Format::Json,
@@ -96,16 +97,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let keeps = arguments.smooth || arguments.report.is_some();
     let follower = if keeps {
-        Follower::Smoother(SmoothTracker::new(tracking.likelihood(), config))
+        TrackFilter::Smoother(SmoothTracker::new(tracking.likelihood(), config))
     } else {
-        Follower::Filter(Tracker::new(tracking.likelihood(), config))
+        TrackFilter::Filter(Tracker::new(tracking.likelihood(), config))
     };
     let taring = Taring::new(&arguments.tare.in_use(&locator), &locator, false)?;
     let records = if arguments.json { Records::Json } else { Records::None };
     let mut stream = Stream {
         arguments,
         taring,
-        follower,
+        filter: follower,
         extent,
         format,
         lines: Lines::open(arguments.readings.as_deref().unwrap_or(Path::new("-")), records)?,
@@ -120,12 +121,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         ran => ran.map(|()| None)?,
     };
     let (filtered, smoothed) = stream.finish()?;
-    stream.say_errors(&filtered, &smoothed);
+    stream.print_errors(&filtered, &smoothed);
     if let Some(folder) = &report {
         let sweep = match rig.as_ref().and_then(|rig| Some((rig, rig.motion.as_ref()?))) {
             Some((rig, moving)) if beam.is_some() => {
-                let pressed = rig.pressed_setup().map_err(Complaint::new)?;
-                sweep_speeds(&locator, config, &pressed, moving, arguments.seed).map_err(Complaint::new)?
+                let pressed = rig.training_setup().map_err(UserError::new)?;
+                sweep_speeds(&locator, config, &pressed, moving, arguments.seed).map_err(UserError::new)?
             }
             _ => Vec::new(),
         };
@@ -150,7 +151,7 @@ impl Arguments {
     }
 }
 
-enum Follower {
+enum TrackFilter {
     Filter(Tracker),
     Smoother(SmoothTracker),
 }
@@ -158,7 +159,7 @@ enum Follower {
 struct Stream<'a> {
     arguments: &'a Arguments,
     taring: Option<Taring<'a>>,
-    follower: Follower,
+    filter: TrackFilter,
     extent: Extent,
     format: Format,
     lines: Lines,
@@ -181,46 +182,46 @@ impl Stream<'_> {
         }
         while let Some(reading) = parsing.next(&mut self.lines)? {
             if let Some(reading) = reading {
-                self.follow(reading, &mut out)?;
+                self.update(reading, &mut out)?;
             }
             let parser = &mut parsing.parser;
             if !parser.progress().awaits_columns() && !parser.has_time() && self.arguments.rate.is_none() {
                 let column =
                     columns.time.as_ref().map_or("`time_s`".to_owned(), |time| time.column.to_string());
-                let complaint = Complaint::new(format!("{} has no column {column}", self.lines.name()));
+                let complaint = UserError::new(format!("{} has no column {column}", self.lines.name()));
                 return Err(complaint.help("--rate gives the number of readings per second").into());
             }
         }
         if parsing.parser.progress().awaits_columns() && self.lines.is_whole() {
-            let complaint = Complaint::new(format!("{} contains no reading", self.lines.name()));
+            let complaint = UserError::new(format!("{} contains no reading", self.lines.name()));
             return Err(complaint.help("it must begin with a header").into());
         }
         self.taring.as_ref().map_or(Ok(()), |taring| taring.finish(self.lines.name()))
     }
 
-    fn follow(&mut self, mut reading: TimedReading, out: &mut impl Write) -> Result<(), Failure> {
+    fn update(&mut self, mut reading: TimedReading, out: &mut impl Write) -> Result<(), Failure> {
         let rate_s = |rate_hz: f64| self.times as f64 / rate_hz;
         let time_s = reading.time_s.or(self.arguments.rate.map(rate_s)).unwrap_or(0.0);
         self.times += 1;
         let taken = match &mut self.taring {
-            None => Ok(Taken::Tared),
+            None => Ok(TareOutcome::Tared),
             Some(taring) => {
                 let has_time = reading.time_s.is_some() || self.arguments.rate.is_some();
                 taring.take(&mut reading.reading, has_time.then_some(time_s))
             }
         };
         match taken {
-            Ok(Taken::Tared | Taken::Located(_)) => {}
-            Ok(Taken::Baseline) => return Ok(()),
-            Err(error) => return self.lines.lose(&error),
+            Ok(TareOutcome::Tared | TareOutcome::Located(_)) => {}
+            Ok(TareOutcome::Baseline) => return Ok(()),
+            Err(error) => return self.lines.skip_reading(&error),
         }
-        let track = match &mut self.follower {
-            Follower::Filter(tracker) => tracker.follow(time_s, &reading.reading).map(Some),
-            Follower::Smoother(tracker) => tracker.follow(time_s, &reading.reading).map(|()| None),
+        let track = match &mut self.filter {
+            TrackFilter::Filter(tracker) => tracker.update(time_s, &reading.reading).map(Some),
+            TrackFilter::Smoother(tracker) => tracker.update(time_s, &reading.reading).map(|()| None),
         };
         let track = match track {
             Ok(track) => track,
-            Err(error) => return self.lines.lose(&error),
+            Err(error) => return self.lines.skip_reading(&error),
         };
         self.truths.extend(reading.truth.clone());
         let Some(track) = track else {
@@ -238,7 +239,7 @@ impl Stream<'_> {
     /// Returns the tracks of filter and smoother; prints the deferred ones.
     fn finish(&mut self) -> Result<(Vec<Track>, Vec<Track>), Failure> {
         let mut out = std::io::stdout().lock();
-        let Follower::Smoother(tracker) = &self.follower else {
+        let TrackFilter::Smoother(tracker) = &self.filter else {
             self.print_summary(&mut out)?;
             return Ok((std::mem::take(&mut self.filtered), Vec::new()));
         };
@@ -282,7 +283,7 @@ impl Stream<'_> {
         [of("filter", filtered), of("smoother", smoothed)].into_iter().flatten().collect()
     }
 
-    fn say_errors(&self, filtered: &[Track], smoothed: &[Track]) {
+    fn print_errors(&self, filtered: &[Track], smoothed: &[Track]) {
         let errors = self.errors(filtered, smoothed);
         if errors.is_empty() {
             return;
@@ -365,7 +366,7 @@ impl Columns {
     }
 }
 
-fn cells_on_line(contact: Option<&Tracked>) -> Vec<String> {
+fn cells_on_line(contact: Option<&TrackedContact>) -> Vec<String> {
     let Some(tracked) = contact else { return vec![String::new(); 7] };
     let (low_m, high_m) = tracked.x_95_m;
     let (low_n, high_n) = tracked.force_interval_95_n();
@@ -374,8 +375,8 @@ fn cells_on_line(contact: Option<&Tracked>) -> Vec<String> {
     numbers.map(cell).to_vec()
 }
 
-fn cells_on_plane(contact: Option<&Tracked>) -> Vec<String> {
-    let on_plane = contact.and_then(|tracked| Some((tracked, tracked.across?)));
+fn cells_on_plane(contact: Option<&TrackedContact>) -> Vec<String> {
+    let on_plane = contact.and_then(|tracked| Some((tracked, tracked.transverse?)));
     let Some((tracked, across)) = on_plane else { return vec![String::new(); 11] };
     let ((x_low_m, x_high_m), (y_low_m, y_high_m)) = (tracked.x_95_m, across.y_95_m);
     let (low_n, high_n) = tracked.force_interval_95_n();
@@ -418,14 +419,14 @@ fn json(track: &Track, line: u64, extent: Extent) -> Result<String, Failure> {
         },
         "single_status": track.single.status.name(),
     };
-    serde_json::to_string(&object).map_err(|error| Complaint::new(error).into())
+    serde_json::to_string(&object).map_err(|error| UserError::new(error).into())
 }
 
-fn contact_fields(tracked: &Tracked) -> impl Fields {
+fn contact_fields(tracked: &TrackedContact) -> impl Fields {
     let mm = |(low_m, high_m): (f64, f64)| [low_m * 1e3, high_m * 1e3];
     let [sd_m, sd_speed_m_per_s, sd_force_n] = tracked.sd;
     let (low_n, high_n) = tracked.force_interval_95_n();
-    let across = |across: Across| {
+    let across = |across: TransverseMotion| {
         fields! {
             "y_mm": across.y_m * 1e3,
             "speed_y_m_per_s": across.speed_m_per_s,
@@ -444,6 +445,6 @@ fn contact_fields(tracked: &Tracked) -> impl Fields {
         "sd_speed_m_per_s": sd_speed_m_per_s,
         "sd_force_n": sd_force_n,
         "force_95_n": [low_n, high_n],
-        ..tracked.across.map(across),
+        ..tracked.transverse.map(across),
     }
 }

@@ -74,7 +74,7 @@ fn recordings_are_refused_at_the_place() {
 }
 
 #[test]
-fn what_is_no_text_is_refused_at_its_first_zero_byte() {
+fn binary_data_is_refused_at_its_first_zero_byte() {
     let utf16: Vec<u8> = PAPER.encode_utf16().flat_map(u16::to_le_bytes).collect();
     for verb in ["inspect", "limit", "init"] {
         let told = complaint(&[("rig.toml", &utf16)], &[verb, "rig.toml"]);

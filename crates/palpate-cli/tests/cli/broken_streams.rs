@@ -118,7 +118,7 @@ fn a_recording_is_kept_whole_where_its_samples_cannot_be_printed() {
 }
 
 #[test]
-fn a_full_or_closed_stderr_changes_nothing() {
+fn full_or_closed_stderr_has_no_effect() {
     let bench = bench();
     for arguments in VERBS.into_iter().chain(COMPLAINTS) {
         let wanted = code(palpate(bench.path()).args(arguments).stdout(Stdio::null()).stderr(Stdio::null()));

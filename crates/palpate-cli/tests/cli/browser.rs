@@ -44,7 +44,7 @@ fn the_width_is_the_one_asked_for() {
 }
 
 #[test]
-fn every_fault_of_a_bad_page_is_told() {
+fn every_fault_of_a_bad_page_is_reported() {
     let Some(page) = measured(BAD, PHONE) else { return };
     assert!(page.content_width >= 2000, "{page:?}");
     assert_eq!(page.errors.len(), 2, "{page:?}");

@@ -104,7 +104,7 @@ fn a_machine_calibrates_to_the_limit_unattended() {
     let locator = Locator::from_json(&json).unwrap();
     let rig = Rig::from_toml(RIG).unwrap();
     let trial = rig.trials(1, 77).unwrap().remove(0);
-    let evaluation = Evaluation::new(&locator, &trial.judged).unwrap();
+    let evaluation = Evaluation::new(&locator, &trial.held_out).unwrap();
     let ratio = limit_ratio(&rig.setup, &evaluation).unwrap();
     assert!((0.8..1.2).contains(&ratio), "{ratio} × the limit");
     presses_that_are_missing_are_pressed_again(folder.path(), &bench);
@@ -394,7 +394,7 @@ fn presses_that_no_reading_shows_end_the_calibration() {
 }
 
 #[test]
-fn a_machine_that_is_not_there_and_a_rig_without_a_stage_are_told_with_a_remedy() {
+fn absent_machine_and_rig_without_a_stage_are_reported_with_a_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let rig = RIG.split("[stage]").next().unwrap();
     std::fs::write(folder.path().join("rig.toml"), rig).unwrap();
@@ -438,7 +438,7 @@ fn a_machine_that_is_not_there_and_a_rig_without_a_stage_are_told_with_a_remedy(
 }
 
 #[test]
-fn a_board_whose_frames_are_no_readings_is_told_at_once() {
+fn board_without_readings_is_reported_at_once() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("rig.toml"), RIG).unwrap();
     let mut child = palpate(folder.path())

@@ -14,7 +14,7 @@ fn with_estimator(folder: &Path, kind: &str) {
 }
 
 #[test]
-fn every_estimator_is_held_against_the_limit() {
+fn every_estimator_is_compared_with_the_limit() {
     // The paper's network takes its time; a short training will do.
     let folder = folder(Toml::parse(NOISY_BEAM).estimator("network").add("estimator.max_epochs", 5_000));
     let arguments = ["compare", "rig.toml", "--json", "--report", "report", "--calibrations", "2"];
@@ -46,7 +46,7 @@ fn every_estimator_is_held_against_the_limit() {
 }
 
 #[test]
-fn only_what_is_asked_for_is_compared() {
+fn only_requested_estimators_are_compared() {
     let folder = folder(NOISY_BEAM);
     let arguments = ["compare", "rig.toml", "--json", "--only", "influence", "--only", "closed-form"];
     let found: Value = serde_json::from_str(&said(&run(folder.path(), &arguments))).unwrap();
@@ -85,7 +85,7 @@ fn every_estimator_is_fitted_inspected_and_locates() {
 }
 
 #[test]
-fn auto_takes_the_best_and_says_why() {
+fn auto_chooses_the_best_and_gives_the_reason() {
     // Networks take their time; two presses at each of six positions do.
     let folder = folder(Toml::parse(NOISY_BEAM).set("training.count", 6).set("training.repeats", 2));
     with_estimator(folder.path(), "auto");
@@ -116,7 +116,7 @@ fn auto_stops_when_its_time_is_used_up() {
 }
 
 #[test]
-fn a_dead_channel_is_left_out_of_the_sums() {
+fn disabled_channel_is_excluded_from_the_sums() {
     let folder = folder(NOISY_BEAM);
     with_estimator(folder.path(), "influence");
     said(&run(folder.path(), &["fit", "other.toml", "-o", "locator.json"]));

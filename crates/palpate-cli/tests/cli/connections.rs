@@ -47,7 +47,7 @@ fn follow(address: &str) -> TcpStream {
 }
 
 #[test]
-fn connections_that_ask_nothing_shut_nobody_out() {
+fn idle_connections_do_not_block_others() {
     let (_server, address) = serve(128);
     let mut browser = follow(&address);
     let half_head = format!("GET /api/session HTTP/1.1\r\nHost: {address}\r\n");

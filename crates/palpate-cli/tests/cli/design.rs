@@ -133,7 +133,7 @@ fn a_plate_has_maps() {
 }
 
 #[test]
-fn what_cannot_be_designed_is_refused_in_words() {
+fn invalid_design_is_refused_with_a_message() {
     let forceless = replaced(SENSOR_DESIGN, "force = \"3 N\"", "");
     let clean = Toml::parse(SENSOR_DESIGN).set("sensors.noise", "0 um").to_string();
     let cases: [(&str, &str, &[&str]); 11] = [

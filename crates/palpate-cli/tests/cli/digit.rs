@@ -47,7 +47,7 @@ fn the_example_is_located_with_its_shape_and_judged() {
 const TIP_MM: (f64, f64) = (74.64, -82.86);
 
 #[test]
-fn the_limit_and_its_report_know_the_bent_finger() {
+fn limit_and_report_support_the_bent_finger() {
     let folder = folder(DIGIT);
     let found = json(
         folder.path(),

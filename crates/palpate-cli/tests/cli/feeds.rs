@@ -230,7 +230,7 @@ fn passwords_are_in_no_message() {
 }
 
 #[test]
-fn a_calibration_without_a_press_says_that_there_is_none() {
+fn calibration_without_a_press_is_reported() {
     let rig = fs::read_to_string(field("base.toml")).unwrap();
     let rig = format!("{rig}\n[training]\narrangement = \"even\"\ncount = 5\n");
     fs::write(BENCH.path().join("training.toml"), rig).unwrap();

@@ -7,7 +7,7 @@ use palpate_estimators::estimator::Locator;
 use palpate_estimators::imperfections::{Amount, Imperfections, OffsetDrift, Relaxation};
 use palpate_estimators::simulate::SimulatedBench;
 use palpate_live::simulated_board::{
-    BoardConfig, FaultConfig, Finger, Hand, HandStyle, Instruction, Link, SimulatedBoard,
+    BoardConfig, FaultConfig, Finger, HandStyle, Instruction, Link, SimulatedBoard, SimulatedHand,
 };
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_rig::Rig;
@@ -50,7 +50,7 @@ fn calibrate(style: HandStyle, faults: FaultConfig, seed: u64) -> Outcome {
     let config = BoardConfig { seed, ..BoardConfig::default() };
     let board = SimulatedBoard::new(&rig.setup, &config, Finger::random(&rig, seed)).unwrap();
     let mut board = board.with_faults(faults, seed).unwrap();
-    let mut hand = Hand::new(style, rig.setup.surface().extent(), seed);
+    let mut hand = SimulatedHand::new(style, rig.setup.surface().extent(), seed);
     let from = format!("serial://{}", link.name());
     let arguments =
         ["calibrate", "rig.toml", "--from", &from, "--presses", "presses.csv", "--out", "strip.json"];
@@ -67,7 +67,7 @@ fn calibrate(style: HandStyle, faults: FaultConfig, seed: u64) -> Outcome {
         assert!(start.elapsed() < PATIENCE, "{style:?}: {}", attempt.said());
         while board.next_at() <= start.elapsed() {
             let contact = hand.contact_at(board.next_at().as_secs_f64(), now);
-            board.finger_mut().hold(contact);
+            board.finger_mut().set_contact(contact);
             link.send(&board.next_frame().unwrap_or_default()).unwrap();
         }
         thread::sleep(Duration::from_millis(2));

@@ -100,7 +100,7 @@ fn three_commands_lead_from_a_spreadsheet_to_estimates() {
 }
 
 #[test]
-fn the_first_rig_of_a_spreadsheet_says_what_it_guesses() {
+fn first_rig_of_a_spreadsheet_lists_its_assumptions() {
     let folder = folder_with(&[("presses.csv", &export(&presses()))]);
     let printed = said(&run(folder.path(), &["init", "presses.csv"]));
     let told = said(&run(folder.path(), &["init", "presses.csv", "-o", "rig.toml"]));
@@ -136,7 +136,7 @@ fn a_stream_of_an_export_is_located_line_by_line() {
 }
 
 #[test]
-fn what_cannot_be_guessed_is_asked_for() {
+fn unknown_roles_are_requested() {
     let nameless = "a,b,c\n10,1,5\n20,2,6\n35,1,9\n";
     let folder = folder_with(&[
         ("nameless.csv", nameless),
@@ -245,7 +245,7 @@ fn field_file(name: &str) -> Vec<u8> {
 }
 
 #[test]
-fn init_and_fit_say_alike_what_they_skip_and_doubt() {
+fn init_and_fit_report_skipped_and_ambiguous_input_alike() {
     let names = ["dup.csv", "units-row.csv", "press.lvm", "utf16.txt", "zero-noise.csv", "negforce.csv"];
     let said_of = |name: &str| {
         let folder = tempfile::tempdir().unwrap();

@@ -114,7 +114,7 @@ fn names_are_those_of_the_manual() {
 }
 
 #[test]
-fn a_damaged_recording_is_told_in_json_too() {
+fn damaged_recording_is_reported_in_json() {
     let folder = tempfile::tempdir().unwrap();
     prepare(folder.path());
     said(&run(folder.path(), &["fit", "beam.toml", "-o", "beam.json"]));

@@ -29,7 +29,7 @@ fn disturbed(board: &mut Board) -> String {
 }
 
 #[test]
-fn drift_scatter_and_what_was_set_aside_are_said() {
+fn drift_scatter_and_excluded_rows_are_reported() {
     let (folder, mut board) = (folder(RIG), Board::new(11));
     fs::write(folder.path().join("presses.csv"), disturbed(&mut board)).unwrap();
     let fit = ["fit", "rig.toml", "--data", "presses.csv", "-o", "board.json"];
@@ -59,7 +59,7 @@ fn drift_scatter_and_what_was_set_aside_are_said() {
 }
 
 #[test]
-fn noise_by_place_is_said() {
+fn noise_by_place_is_reported() {
     let (folder, mut board) = (folder(linear_rig()), Board::new(5));
     let mut csv = "Position,Force,g1,g2,g3,g4,g5,g6\n".to_owned();
     for i in 0..120 {
@@ -95,7 +95,7 @@ fn noise_by_place_is_said() {
 }
 
 #[test]
-fn the_structure_that_was_taken_is_said_with_its_reason() {
+fn chosen_structure_is_reported_with_its_reason() {
     let (folder, mut board) = (folder(RIG), Board::new(3));
     fs::write(folder.path().join("presses.csv"), board.calibration(30)).unwrap();
     let said_of = |structure: &str| {
@@ -111,7 +111,7 @@ fn the_structure_that_was_taken_is_said_with_its_reason() {
 }
 
 #[test]
-fn structures_are_compared_as_estimators_of_their_own() {
+fn structures_are_compared_as_separate_estimators() {
     let (folder, mut board) = (folder(RIG), Board::new(3));
     fs::write(folder.path().join("presses.csv"), board.calibration(30)).unwrap();
     let names = |only: &str| -> Vec<String> {

@@ -57,7 +57,7 @@ fn the_json_has_the_papers_figures() {
 }
 
 #[test]
-fn what_the_readings_do_not_tell_is_null() {
+fn unidentifiable_values_are_null() {
     let one = Toml::parse(PAPER).set("sensors.count", 1).to_string();
     let found = curve(&one, &[]);
     assert!(
@@ -89,7 +89,7 @@ force = "1000 N"
 "#;
 
 #[test]
-fn over_a_support_an_unknown_force_is_not_told() {
+fn unknown_force_over_a_support_is_unidentifiable() {
     let folder = folder(LONG_BEAM);
     let table = said(&run(folder.path(), &["limit", "rig.toml", "--force", "1000 N", "--report", "report"]));
     let row = table.lines().find(|line| line.starts_with("12000 mm")).unwrap();
@@ -119,7 +119,7 @@ fn the_even_layout_of_a_design_keeps_off_the_support() {
 }
 
 #[test]
-fn a_dead_sensor_is_left_out() {
+fn disabled_sensor_is_excluded() {
     let dead = Toml::parse(PAPER).add("sensors.dead", Array::from_iter([4]));
     let (whole, rest) = (curve(PAPER, &[]), curve(dead, &[]));
     assert_eq!((&rest["sensors"], &rest["sensors_alive"]), (&Value::from(8), &Value::from(7)));

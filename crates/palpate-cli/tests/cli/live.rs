@@ -182,7 +182,7 @@ fn a_folder_of_recordings_that_is_none_is_refused_before_anything_is_served() {
 }
 
 #[test]
-fn outlets_are_refused_with_what_is_wrong_or_how_to_build_them() {
+fn sinks_are_refused_with_the_error_or_the_missing_feature() {
     let folder = bench();
     let record = ["record", "locator.json", "--from", BOARD, "--out", "never.mcap"];
     let refused = |option: &[&str]| complained(&run(folder.path(), &[&record[..], option].concat()), 2);
@@ -208,7 +208,7 @@ fn outlets_are_refused_with_what_is_wrong_or_how_to_build_them() {
 }
 
 #[test]
-fn a_board_of_other_channels_is_no_recording_and_says_why() {
+fn board_with_other_channels_is_not_recorded_and_the_reason_is_reported() {
     let folder = bench();
     fs::write(folder.path().join("other.toml"), NOISY_BEAM.replace("count = 8 ", "count = 5 ")).unwrap();
     let board = "simulated:other.toml?rate=500";
@@ -220,7 +220,7 @@ fn a_board_of_other_channels_is_no_recording_and_says_why() {
 }
 
 #[test]
-fn a_broker_that_is_not_there_is_told_with_what_is_lost() {
+fn absent_broker_is_reported_with_the_losses() {
     let folder = bench();
     let record = ["record", "locator.json", "--from", BOARD, "--out", "press.mcap", "--duration", "0.5 s"];
     let output = run(folder.path(), &[&record[..], &["--mqtt", "mqtt://127.0.0.1:1/bench"]].concat());

@@ -174,7 +174,7 @@ fn rules_send_commands_to_the_board_over_a_pseudo_terminal_and_tcp() {
 }
 
 #[test]
-fn rules_that_ask_for_a_force_of_a_locator_that_tells_none_are_refused() {
+fn rules_about_a_force_need_a_locator_that_estimates_it() {
     let (rest, _) = NOISY_BEAM.split_once("[estimator]").unwrap();
     let folder = bench(&format!("{rest}[estimator]\nkind = \"network\"\nmax_epochs = 200\n"));
     let record = ["record", "locator.json", "--out", "never.mcap", "--rules", "rules.toml", "--from", BOARD];

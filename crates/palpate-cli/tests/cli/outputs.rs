@@ -83,7 +83,7 @@ fn links_to_inputs_are_inputs() {
 
 #[test]
 #[cfg(unix)]
-fn what_is_no_file_is_not_replaced() {
+fn only_regular_files_are_replaced() {
     use std::os::unix::fs::{FileTypeExt, symlink};
     let folder = folder(NOISY_BEAM);
     let at = |name: &str| folder.path().join(name);

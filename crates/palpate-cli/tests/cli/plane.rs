@@ -97,7 +97,7 @@ fn the_papers_network_learns_the_plate_a_little() {
 }
 
 #[test]
-fn a_count_does_not_say_where_on_a_plane() {
+fn count_on_a_plane_needs_positions() {
     let folder = folder(Toml::parse(PLATE).remove("sensors.grid").add("sensors.count", 9));
     let refused = complained(&run(folder.path(), &["inspect", "rig.toml"]), 2);
     assert!(refused.contains("`count` does not go with a plane"), "{refused}");

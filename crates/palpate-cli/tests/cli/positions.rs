@@ -57,7 +57,7 @@ fn a_plate_is_pressed_on_a_grid_or_better() {
 }
 
 #[test]
-fn a_recording_begun_tells_the_next_press_and_when_to_stop() {
+fn begun_recording_gives_the_next_press_and_the_stop() {
     let folder = folder(SENSOR_DESIGN);
     said(&run(folder.path(), &["simulate", "rig.toml", "-o", "all.csv"]));
     let all = fs::read_to_string(folder.path().join("all.csv")).unwrap();
@@ -72,7 +72,7 @@ fn a_recording_begun_tells_the_next_press_and_when_to_stop() {
 }
 
 #[test]
-fn what_cannot_be_designed_is_refused_in_words() {
+fn invalid_design_is_refused_with_a_message() {
     let refused = |rig: &str, arguments: &[&str]| {
         let folder = folder(rig);
         fs::write(folder.path().join("few.csv"), "position_mm,force_n\n1,2\n").unwrap();

@@ -14,7 +14,7 @@ fn number(value: &Value) -> f64 {
 }
 
 #[test]
-fn the_example_tells_both_pads() {
+fn example_resolves_both_pads() {
     let folder = folder(LOAD_PROFILE);
     let json =
         said(&run(folder.path(), &["profile", "rig.toml", "--json", "--seed", "1", "--report", "page"]));
@@ -68,7 +68,7 @@ fn people_get_a_table() {
 }
 
 #[test]
-fn readings_are_told_as_they_come_by_rigs_and_locators() {
+fn readings_are_printed_as_they_arrive() {
     let folder = folder(Toml::parse(LOAD_PROFILE).remove("load").to_string() + PRESSED);
     let press = ["simulate", "rig.toml", "--every", "150 mm", "-o", "presses.csv", "--seed", "2"];
     said(&run(folder.path(), &press));
@@ -102,7 +102,7 @@ fn readings_are_told_as_they_come_by_rigs_and_locators() {
 }
 
 #[test]
-fn what_cannot_be_told_is_refused_in_words() {
+fn invalid_profile_requests_are_refused() {
     let unloaded = Toml::parse(LOAD_PROFILE).remove("load").to_string();
     let clean = Toml::parse(LOAD_PROFILE).set("sensors.0.noise", "0 um").to_string();
     let cases: [(&str, &str, &[&str]); 3] = [
@@ -118,7 +118,7 @@ fn what_cannot_be_told_is_refused_in_words() {
 }
 
 #[test]
-fn a_total_without_an_upper_end_is_said_as_such() {
+fn total_without_an_upper_bound_is_printed_as_such() {
     let bench = LOAD_PROFILE.split("[[load]]").next().unwrap();
     let folder = folder(format!("{bench}[[load]]\nfrom = \"2 mm\"\nto = \"6 mm\"\nforce = \"0.2 N\"\n"));
     let told = said(&run(folder.path(), &["profile", "rig.toml"]));

@@ -25,7 +25,7 @@ fn warned(folder: &Path, arguments: &[&str]) -> String {
 }
 
 /// Share of the fresh touches within their intervals, and number of untouched rows that are `no_contact`, of how many.
-fn judged(folder: &Path, locator: &str) -> (f64, usize, usize) {
+fn coverage_and_no_contacts(folder: &Path, locator: &str) -> (f64, usize, usize) {
     let located = said(&run(folder, &["locate", locator, "fresh.csv"]));
     let fresh = fs::read_to_string(folder.join("fresh.csv")).unwrap();
     let (mut within, mut touches, mut free, mut untouched) = (0, 0, 0, 0);
@@ -62,7 +62,8 @@ fn a_logger_faster_than_its_sensors_is_calibrated_as_if_each_reading_were_there_
     let stderr = fit("hold.toml", "hold25.csv", "hold.json");
     assert!(stderr.contains(said_of_rows) && stderr.contains("repeated_readings = \"keep\""), "{stderr}");
     assert!(!fit("nohold.toml", "nohold25.csv", "nohold.json").contains("repeat the row"));
-    let (held, plain) = (judged(folder, "hold.json"), judged(folder, "nohold.json"));
+    let (held, plain) =
+        (coverage_and_no_contacts(folder, "hold.json"), coverage_and_no_contacts(folder, "nohold.json"));
     assert_eq!(held, plain);
     assert!(held.0 > 0.9 && held.1 == held.2, "{held:?}");
     for arguments in [

@@ -141,7 +141,7 @@ fn shards_make_the_files_of_a_single_machine() {
 }
 
 #[test]
-fn a_shard_says_what_it_is() {
+fn shard_identifies_itself() {
     let bench = bench();
     let folder = bench.path();
     let table = study(folder, &["--shard", "2/3", "--seeds", "2"]);

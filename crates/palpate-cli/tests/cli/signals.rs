@@ -115,7 +115,7 @@ fn a_wait_for_input_ends_at_once() {
 }
 
 #[test]
-fn a_stream_that_is_stopped_keeps_what_it_has_told() {
+fn stopped_stream_keeps_its_output() {
     let bench = moving_bench();
     let folder = bench.path();
     let csv = fs::read_to_string(folder.join("moving.csv")).unwrap();
@@ -144,7 +144,7 @@ fn a_stream_that_is_stopped_keeps_what_it_has_told() {
 }
 
 #[test]
-fn what_came_before_a_signal_is_smoothed_and_reported() {
+fn readings_before_a_signal_are_smoothed_and_reported() {
     let bench = moving_bench();
     let folder = bench.path();
     let csv = fs::read_to_string(folder.join("moving.csv")).unwrap();

@@ -111,7 +111,7 @@ fn every_answer_has_the_line_of_its_reading() {
 }
 
 #[test]
-fn tracks_and_profiles_say_their_lines_too() {
+fn tracks_and_profiles_have_line_numbers() {
     let folder = folder(Toml::parse(MOVING_LOAD));
     let path = folder.path();
     said(&run(path, &["fit", "rig.toml", "-o", "locator.json"]));
@@ -162,7 +162,7 @@ fn estimates_without_a_contact_have_no_place_unless_asked() {
 }
 
 #[test]
-fn a_second_contact_has_columns_of_its_own() {
+fn second_contact_has_separate_columns() {
     let folder = folder(TWO_MOVING_LOADS);
     let path = folder.path();
     said(&run(path, &["fit", "rig.toml", "-o", "locator.json"]));

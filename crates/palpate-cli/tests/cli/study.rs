@@ -47,7 +47,7 @@ fn threads_do_not_change_a_single_byte() {
 }
 
 #[test]
-fn the_papers_study_replicates_what_it_is_known_to() {
+fn papers_study_replicates_the_known_results() {
     let folder = tempfile::tempdir().unwrap();
     said(&run(folder.path(), &["study", "paper", "--seeds", "5", "--out", "out"]));
     let results = results(folder.path(), "out");

@@ -68,7 +68,7 @@ fn the_limit_of_the_cantilever_is_that_of_its_clamp() {
 }
 
 #[test]
-fn a_contact_over_a_rigid_support_is_said_not_to_show() {
+fn contact_over_a_rigid_support_is_reported_undetectable() {
     let folder = folder(Toml::parse(CONTINUOUS_BEAM).remove("sensors.1"));
     let found = said(&run(folder.path(), &["limit", "rig.toml"]));
     let faint: Vec<&str> = found.lines().filter(|line| line.contains("faint")).collect();

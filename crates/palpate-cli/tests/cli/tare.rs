@@ -29,7 +29,7 @@ fn touches(board: &mut Board) -> Vec<Touch> {
 }
 
 /// Mean error of the touches, in millimetres, and the share of untouched rows behind the first that are `no_contact`.
-fn judged(folder: &Path, touches: &[Touch], options: &[&str]) -> (f64, f64) {
+fn error_and_false_alarms(folder: &Path, touches: &[Touch], options: &[&str]) -> (f64, f64) {
     let located = said(&run(folder, &[&["locate", "board.json", "touches.csv", "--all"], options].concat()));
     let rows: Vec<Vec<&str>> = located.lines().skip(1).map(|line| line.split(',').collect()).collect();
     assert_eq!(rows.len(), touches.len());
@@ -51,26 +51,26 @@ fn a_board_that_moved_is_as_good_as_a_fresh_one_with_a_tare() {
     let touches = touches(&mut board);
     let file = |name: &str, text: String| fs::write(folder.path().join(name), text).unwrap();
     file("touches.csv", board.recording(&touches));
-    let fresh = judged(folder.path(), &touches, &[]);
+    let fresh = error_and_false_alarms(folder.path(), &touches, &[]);
     board.move_offsets(50.0);
     file("touches.csv", board.recording(&touches));
     file("untouched.csv", board.recording(&[Touch::NONE; 80]));
-    let moved = judged(folder.path(), &touches, &[]);
+    let moved = error_and_false_alarms(folder.path(), &touches, &[]);
     println!("fresh {fresh:?}, moved {moved:?}");
     assert!(fresh.1 > 0.95 && moved.1 < 0.1 && moved.0 > 5.0 * fresh.0, "{fresh:?} {moved:?}");
     for tare in [FIRST.to_string().as_str(), "untouched.csv", "auto", &format!("{FIRST},auto")] {
-        let tared = judged(folder.path(), &touches, &["--tare", tare]);
+        let tared = error_and_false_alarms(folder.path(), &touches, &["--tare", tare]);
         println!("--tare {tare}: {tared:?}");
         assert!(tared.0 < 1.15 * fresh.0 + 0.1, "--tare {tare}: {tared:?}, fresh {fresh:?}");
         assert!(tared.1 > 0.95, "--tare {tare}: {tared:?}");
     }
     // One reading has more noise than a mean, of which a calibration by offsets does not know.
-    let last = judged(folder.path(), &touches, &["--tare", "last"]);
+    let last = error_and_false_alarms(folder.path(), &touches, &["--tare", "last"]);
     assert!(last.0 < 1.5 * fresh.0 && last.1 > 0.5, "{last:?}, fresh {fresh:?}");
 }
 
 #[test]
-fn what_a_tare_takes_is_said_and_its_rows_stay_in_their_places() {
+fn rows_of_a_tare_are_reported_and_keep_their_places() {
     let (folder, mut board) = fitted();
     board.move_offsets(50.0);
     let touch = Touch { position_mm: 150.0, force_n: 2.0 };
@@ -159,7 +159,7 @@ fn a_palm_while_a_session_starts_is_no_baseline_for_good() {
 }
 
 #[test]
-fn an_automatic_tare_says_how_many_untouched_readings_it_found() {
+fn automatic_tare_counts_its_untouched_readings() {
     let (folder, mut board) = fitted();
     let touch = Touch { position_mm: 150.0, force_n: 2.0 };
     let told = |board: &mut Board, touches: &[Touch]| {
@@ -252,7 +252,7 @@ fn drifting(board: &mut Board) -> String {
 }
 
 #[test]
-fn held_out_readings_are_judged_without_the_drift_of_the_recording() {
+fn held_out_readings_are_evaluated_without_the_drift_of_the_recording() {
     let (folder, mut board) = fitted();
     let file = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
     file("drift.csv", &drifting(&mut board));
@@ -371,10 +371,10 @@ fn a_calibration_by_the_latest_zero_is_used_by_it() {
     said(&run(folder.path(), &["fit", "rig.toml", "--data", "presses.csv", "-o", "board.json"]));
     let touches = touches(&mut board);
     fs::write(folder.path().join("touches.csv"), board.recording(&touches)).unwrap();
-    let fresh = judged(folder.path(), &touches, &[]);
+    let fresh = error_and_false_alarms(folder.path(), &touches, &[]);
     board.move_offsets(500.0);
     fs::write(folder.path().join("touches.csv"), board.recording(&touches)).unwrap();
-    let moved = judged(folder.path(), &touches, &[]);
+    let moved = error_and_false_alarms(folder.path(), &touches, &[]);
     println!("fresh {fresh:?}, moved {moved:?}");
     assert!(moved.0 < 1.15 * fresh.0 + 0.1 && moved.1 > 0.95, "{fresh:?} {moved:?}");
 }

@@ -102,7 +102,7 @@ fn prints_few_messages_about_many_skipped_rows() {
 }
 
 #[test]
-fn what_cannot_be_tracked_is_refused_in_words() {
+fn invalid_tracking_is_refused_with_a_message() {
     let folder = moved();
     said(&run(folder.path(), &["simulate", "rig.toml", "-o", "presses.csv"]));
     let without_time = complained(&run(folder.path(), &["track", "locator.json", "presses.csv"]), 2);
@@ -116,7 +116,7 @@ fn what_cannot_be_tracked_is_refused_in_words() {
 }
 
 #[test]
-fn two_contacts_are_followed_in_columns_of_their_own() {
+fn two_contacts_are_tracked_in_separate_columns() {
     let folder = folder(TWO_MOVING_LOADS);
     said(&run(folder.path(), &["fit", "rig.toml", "-o", "locator.json"]));
     said(&run(folder.path(), &["simulate", "rig.toml", "--moving", "-o", "moving.csv", "--seed", "1"]));

@@ -84,7 +84,7 @@ fn readings_are_located_as_they_come() {
 }
 
 #[test]
-fn inspect_says_what_a_file_holds() {
+fn inspect_describes_the_contents_of_a_file() {
     let folder = paper_bench();
     fs::write(folder.path().join("fsi.toml"), FSI_WATER).unwrap();
     let inspect = |file: &str| said(&run(folder.path(), &["inspect", file]));

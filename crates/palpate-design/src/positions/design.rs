@@ -103,7 +103,7 @@ impl PositionDesign {
     }
 
     pub(super) fn weighted_contacts(&self, extent: Extent) -> Result<WeightedContacts, OutOfRange> {
-        let all_over = || ContactPrior::all_over(extent);
+        let all_over = || ContactPrior::over_surface(extent);
         WeightedContacts::from_prior(&self.contacts.clone().unwrap_or_else(all_over), extent)
     }
 }

@@ -1,7 +1,7 @@
 //! Whitened readings as a Gaussian process of the contact position.
 
 use super::design::PositionError;
-use super::presses::{Presses, living};
+use super::presses::{Presses, enabled_sensors};
 use ndarray::Array2;
 use palpate_estimators::arrangement::cells;
 use palpate_estimators::setup::Setup;
@@ -41,7 +41,7 @@ impl ForwardModel {
         };
         let positions = cells(extent, side, side);
         let sensors = CleanSensors::new_watched(surface, setup.layout(), watch)?;
-        let living: Vec<usize> = living(setup.layout()).collect();
+        let living: Vec<usize> = enabled_sensors(setup.layout()).collect();
         let clean = |&position: &Position| {
             let reading = sensors.reading(Contact { position, force_n });
             living.iter().map(|&s| reading[s]).collect()

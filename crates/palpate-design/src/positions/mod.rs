@@ -59,7 +59,7 @@ const SEARCH_SEEDS: u64 = 1 << 32;
 
 /// Training positions and their verification.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Placed {
+pub struct VerifiedPositions {
     /// Rule or search of the positions.
     pub placement: Placement,
     /// Training positions; on a line from left to right.
@@ -71,10 +71,10 @@ pub struct Placed {
 }
 
 /// Returns the first arrangement within two standard errors of the least mean error.
-pub fn best_placed(placed: &[Placed]) -> Option<&Placed> {
-    let error = |placed: &Placed| placed.verification.mean_error_m;
+pub fn best_placed(placed: &[VerifiedPositions]) -> Option<&VerifiedPositions> {
+    let error = |placed: &VerifiedPositions| placed.verification.mean_error_m;
     let least = placed.iter().min_by(|a, b| error(a).total_cmp(&error(b)))?;
-    let as_good = |one: &&Placed| {
+    let as_good = |one: &&VerifiedPositions| {
         let apart = one.verification.standard_error_m.hypot(least.verification.standard_error_m);
         error(one) - error(least) <= 2.0 * apart
     };
@@ -84,7 +84,7 @@ pub fn best_placed(placed: &[Placed]) -> Option<&Placed> {
 /// Checked setup and design task of training positions.
 pub struct PositionProblem {
     design: PositionDesign,
-    pressed: Setup,
+    training_setup: Setup,
     /// Simulated calibration without training positions.
     calibration: Calibration,
     extent: Extent,
@@ -121,7 +121,7 @@ impl PositionProblem {
             Force::Known if setup.force_n().is_some() => (Force::Known, calibration),
             _ => (Force::Unknown, calibration.unknown_force()),
         };
-        Ok(Self { design: design.clone(), pressed, calibration, extent, force, contacts })
+        Ok(Self { design: design.clone(), training_setup: pressed, calibration, extent, force, contacts })
     }
 
     /// Design task.
@@ -148,7 +148,7 @@ impl PositionProblem {
     ///
     /// # Errors
     /// [`PositionError`] if a fit fails, or if cancelled.
-    pub fn all(&self, watch: Watch) -> Result<Vec<Placed>, PositionError> {
+    pub fn all(&self, watch: Watch) -> Result<Vec<VerifiedPositions>, PositionError> {
         let mut arrangements = self.by_rule()?;
         arrangements.push((Placement::VarianceOptimal, self.variance_optimal(watch)?));
         let by_rule = arrangements.iter().map(|(_, positions)| positions.clone());
@@ -198,7 +198,7 @@ impl PositionProblem {
 
     fn variance_optimal(&self, watch: Watch) -> Result<Vec<Position>, PositionError> {
         watch.stage("least variance", f64::NAN)?;
-        let forward = ForwardModel::from_mechanics(&self.pressed, self.force, watch)?;
+        let forward = ForwardModel::from_mechanics(&self.training_setup, self.force, watch)?;
         Ok(variance::least(&forward, &self.contacts, self.extent, &self.design, watch)?)
     }
 
@@ -221,9 +221,10 @@ impl PositionProblem {
     }
 
     fn is_mirrored(&self) -> bool {
-        let setup = &self.pressed;
+        let setup = &self.training_setup;
         let (Some(surface), Some(force_n)) = (setup.surface().model(), setup.force_n()) else { return false };
-        matches!(self.extent, Extent::Line { .. }) && search::reads_mirrored(surface, setup.layout(), force_n)
+        matches!(self.extent, Extent::Line { .. })
+            && search::is_mirror_symmetric(surface, setup.layout(), force_n)
     }
 
     fn verified(
@@ -231,12 +232,12 @@ impl PositionProblem {
         placement: Placement,
         positions: Vec<Position>,
         watch: Watch,
-    ) -> Result<Placed, PositionError> {
+    ) -> Result<VerifiedPositions, PositionError> {
         let seeds = (self.design.seed, self.design.verifications);
         let judged = self.calibrate(&positions, READINGS, seeds, watch)?;
         let errors: Vec<Vec<f64>> = judged.iter().map(|one| errors_by_contact(one, &self.contacts)).collect();
         let mean_error_m = |contact: usize| mean(errors.iter().map(|errors_m| errors_m[contact]));
-        Ok(Placed {
+        Ok(VerifiedPositions {
             placement,
             positions,
             verification: Verification::from_calibrations(&judged, &self.contacts, self.design.tolerance_m),
@@ -252,12 +253,12 @@ impl PositionProblem {
         (first, count): (u64, usize),
         watch: Watch,
     ) -> Result<Vec<Evaluation>, PositionError> {
-        let channels = self.pressed.layout().sensors().iter().map(|sensor| sensor.channel);
+        let channels = self.training_setup.layout().sensors().iter().map(|sensor| sensor.channel);
         let faultless = channels.into_iter().all(|channel| channel == ChannelModel::default());
         let readings = if faultless { 1 } else { readings.div_ceil(self.contacts.len()) };
-        let calibration = self.calibration.clone().pressed_at(positions, self.design.repeats);
+        let calibration = self.calibration.clone().with_presses(positions, self.design.repeats);
         let seeds = (0..count as u64).map(|k| first.wrapping_add(k));
-        let calibrated = calibration.judged_at(&self.contacts.positions, readings).run_many(
+        let calibrated = calibration.with_contacts(&self.contacts.positions, readings).run_many(
             &self.design.estimator,
             seeds,
             watch,

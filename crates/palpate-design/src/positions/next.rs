@@ -120,7 +120,7 @@ pub fn next_press(
     if expected.error_m(|_| 0.0) > MOST_OF_A_GUESS * expected.error_m(|_| f64::INFINITY) {
         return Err(PositionError::NothingTold);
     }
-    let pressed = few_of(&presses.places);
+    let pressed = subsample(&presses.places);
     let first = expected.places.len();
     expected.places.extend(pressed.iter().map(|(position, _)| position));
     let mut posterior = Posterior::prior(&forward, &expected.places);
@@ -149,7 +149,7 @@ pub fn next_press(
     Ok(advice)
 }
 
-fn few_of(places: &[(Position, usize)]) -> Vec<(Position, usize)> {
+fn subsample(places: &[(Position, usize)]) -> Vec<(Position, usize)> {
     let mut drawn: Vec<usize> = random_order(places.len(), 0).into_iter().take(MOST_PRESSED).collect();
     drawn.sort_unstable();
     drawn.into_iter().map(|i| places[i]).collect()

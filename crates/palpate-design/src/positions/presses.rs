@@ -37,7 +37,7 @@ pub(super) struct Presses {
     quiet_sds: Vec<f64>,
     /// Repeated presses, and degrees of freedom of their scatter.
     repeated: Vec<usize>,
-    freedom: usize,
+    degrees_of_freedom: usize,
     /// Relative variances due to placement; empty if unknown.
     placement_variances: Vec<f64>,
 }
@@ -62,7 +62,7 @@ impl Presses {
         let offsets = offsets.unwrap_or_default();
         // A constant channel has no information.
         let changes = |s: &usize| touched.iter().any(|row| row.reading[*s] != touched[0].reading[*s]);
-        let living: Vec<usize> = living(layout).filter(changes).collect();
+        let living: Vec<usize> = enabled_sensors(layout).filter(changes).collect();
         if living.is_empty() {
             return Err(PositionError::NothingTold);
         }
@@ -96,7 +96,7 @@ impl Presses {
             stated_sds: stated,
             quiet_sds,
             repeated: repeated.concat(),
-            freedom,
+            degrees_of_freedom: freedom,
             placement_variances: Vec::new(),
         };
         presses.whiten();
@@ -122,8 +122,8 @@ impl Presses {
     /// noise, the stated or untouched noise is used, or the 95 % bound.
     pub fn place_with(&mut self, placed: &[Vec<f64>]) {
         let before = self.reading_sds.clone();
-        if self.freedom > 0 {
-            let resolved = (ONE_SIDED_95 * (2.0 / self.freedom as f64).sqrt()).min(1.0);
+        if self.degrees_of_freedom > 0 {
+            let resolved = (ONE_SIDED_95 * (2.0 / self.degrees_of_freedom as f64).sqrt()).min(1.0);
             for (channel, sd) in self.press_sds.iter_mut().enumerate() {
                 let by_placement = mean(self.repeated.iter().map(|&press| placed[press][channel]));
                 let share = 1.0 - by_placement * (before[channel] / *sd).powi(2);
@@ -154,8 +154,8 @@ impl Presses {
     }
 }
 
-pub(super) fn living(layout: &Layout) -> impl Iterator<Item = usize> {
-    (0..layout.len()).filter(|s| !layout.sensors()[*s].channel.dead)
+pub(super) fn enabled_sensors(layout: &Layout) -> impl Iterator<Item = usize> {
+    (0..layout.len()).filter(|s| !layout.sensors()[*s].channel.disabled)
 }
 
 fn by_position(presses: &[&Row]) -> Vec<Vec<usize>> {

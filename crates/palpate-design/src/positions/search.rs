@@ -130,7 +130,7 @@ impl PatternSearch {
 }
 
 /// Returns true if a mirrored contact gives the reverse readings, up to signs.
-pub(super) fn reads_mirrored(surface: &dyn Surface, layout: &Layout, force_n: f64) -> bool {
+pub(super) fn is_mirror_symmetric(surface: &dyn Surface, layout: &Layout, force_n: f64) -> bool {
     const ASKED: usize = 7;
     let length_m = surface.extent().length_m();
     let sensors = CleanSensors::new(surface, layout);

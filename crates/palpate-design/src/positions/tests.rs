@@ -1,6 +1,6 @@
 use std::sync::LazyLock;
 
-use super::search::reads_mirrored;
+use super::search::is_mirror_symmetric;
 use super::variance::{ExpectedError, Posterior};
 use super::*;
 use crate::contacts::ContactPrior;
@@ -70,10 +70,10 @@ fn a_search_keeps_to_its_trials() {
 fn a_bench_is_mirrored_or_not() {
     let setup = paper().setup;
     let surface = setup.surface().model().unwrap();
-    assert!(reads_mirrored(surface, setup.layout(), 3.0));
+    assert!(is_mirror_symmetric(surface, setup.layout(), 3.0));
     let mut moved = setup.layout().clone();
     moved.edit(|sensors| sensors[0].position.x_m += 1e-3).unwrap();
-    assert!(!reads_mirrored(surface, &moved, 3.0));
+    assert!(!is_mirror_symmetric(surface, &moved, 3.0));
 }
 
 fn forward(setup: &Setup) -> ForwardModel {
@@ -81,7 +81,7 @@ fn forward(setup: &Setup) -> ForwardModel {
 }
 
 #[test]
-fn presses_at_one_place_add_up_and_tell_their_neighbours() {
+fn presses_at_one_place_lower_variance_there_and_nearby() {
     let forward = forward(&noisy().setup);
     let places: Vec<Position> = [0.1, 0.12, 0.3].map(Position::along).into();
     let before = Posterior::prior(&forward, &places);
@@ -120,7 +120,7 @@ fn the_least_variance_is_less_than_the_even_positions() {
     for (setup, count) in [(noisy().setup, 8), (plate(PlateSpec::DEFAULT_ELEMENTS).setup, 9)] {
         let forward = forward(&setup);
         let extent = setup.surface().extent();
-        let contacts = WeightedContacts::from_prior(&ContactPrior::all_over(extent), extent).unwrap();
+        let contacts = WeightedContacts::from_prior(&ContactPrior::over_surface(extent), extent).unwrap();
         let found = variance::least(
             &forward,
             &contacts,
@@ -174,7 +174,7 @@ fn a_design_has_every_arrangement_once_and_is_the_same_again() {
 }
 
 #[test]
-fn what_cannot_be_designed_is_refused() {
+fn invalid_design_is_refused() {
     let refusal =
         |example: Example, count: usize| problem(example, count).map(|_| ()).unwrap_err().to_string();
     let network = "an estimator of kind `network` needs at least 2";
@@ -202,7 +202,7 @@ fn advised(positions_m: &[f64], repeats: usize) -> Advice {
 }
 
 #[test]
-fn the_next_press_is_where_nobody_pressed_and_lowers_the_error() {
+fn next_press_is_at_a_new_position_and_lowers_the_error() {
     let advice = advised(&[0.02, 0.06, 0.1, 0.14, 0.18, 0.22], 5);
     assert!(!advice.is_enough());
     let first = advice.next[0];
@@ -213,13 +213,13 @@ fn the_next_press_is_where_nobody_pressed_and_lowers_the_error() {
 }
 
 #[test]
-fn the_expected_error_is_never_more_than_a_guess() {
+fn expected_error_is_at_most_that_of_the_prior() {
     let guess_m = 0.4 / 12f64.sqrt();
     // Presses in the middle carry almost no information on the readings near the ends.
     let advice = advised(&[0.175, 0.1875, 0.2, 0.2125, 0.225], 5);
     assert!(advice.error_m < guess_m && advice.error_m > 0.3 * guess_m, "{} {guess_m}", advice.error_m);
     let forward = forward(&noisy().setup);
-    let contacts = WeightedContacts::from_prior(&ContactPrior::all_over(*BEAM), *BEAM).unwrap();
+    let contacts = WeightedContacts::from_prior(&ContactPrior::over_surface(*BEAM), *BEAM).unwrap();
     let expected = ExpectedError::new(&forward, &contacts, *BEAM);
     let prior_m = expected.error_m(|_| f64::MAX / 2.0);
     assert!((prior_m / guess_m - 1.0).abs() < 1e-6, "{prior_m} {guess_m}");
@@ -299,7 +299,7 @@ fn smooth_readings_leave_little_to_gain_after_few_presses() {
 }
 
 #[test]
-fn enough_is_said_when_little_is_left_to_gain() {
+fn design_stops_when_the_gain_is_small() {
     let all: Vec<f64> = (0..40).map(|i| 0.005 + 0.01 * f64::from(i)).collect();
     let advice = advised(&all, 10);
     assert!(advice.is_enough() && advice.reaches_goal() && advice.next.is_empty(), "{advice:?}");
@@ -307,7 +307,7 @@ fn enough_is_said_when_little_is_left_to_gain() {
 }
 
 #[test]
-fn a_recording_that_tells_too_little_is_refused() {
+fn recording_with_too_little_information_is_refused() {
     let (setup, recording) = begun(&[0.1, 0.2, 0.3], 2);
     let refused = |setup: &Setup, recording: &Recording| {
         next_press(setup, recording, &PositionDesign::default(), Watch::NONE).unwrap_err().to_string()
@@ -335,7 +335,7 @@ fn forces_that_differ_need_a_reading_without_contact() {
 }
 
 #[test]
-fn presses_that_do_not_tell_places_apart_are_refused() {
+fn presses_that_do_not_distinguish_places_are_refused() {
     let refused = |setup: &Setup, recording: &Recording| {
         next_press(setup, recording, &PositionDesign::default(), Watch::NONE).unwrap_err()
     };
@@ -357,14 +357,14 @@ fn presses_that_do_not_tell_places_apart_are_refused() {
 }
 
 #[test]
-fn a_channel_that_never_changes_is_left_out() {
+fn constant_channel_is_excluded() {
     let (setup, mut recording) = begun(&TEN_M, 3);
     let advice = |setup: &Setup, recording: &Recording| {
         next_press(setup, recording, &PositionDesign::default(), Watch::NONE).unwrap()
     };
     recording.rows.iter_mut().for_each(|row| row.reading[2] = 7.0);
     let mut dead = setup.clone();
-    dead.edit_sensors(|sensors| sensors[2].channel.dead = true).unwrap();
+    dead.edit_sensors(|sensors| sensors[2].channel.disabled = true).unwrap();
     assert_eq!(advice(&setup, &recording), advice(&dead, &recording));
 }
 

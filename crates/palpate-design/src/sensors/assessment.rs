@@ -58,7 +58,7 @@ impl SensorProblem<'_> {
     /// [`DesignError::Limit`] if a sensor has no noise or all sensors are disabled.
     pub fn assess(&self, layout: &Layout) -> Result<Assessment, DesignError> {
         let Sensitivity { surface, contacts, force_n, force } = &self.sensitivity;
-        let weights = self.sensitivity.judged_weights();
+        let weights = self.sensitivity.score_weights();
         let limit = CramerRaoBound::new(*surface, layout)?;
         let curve = LimitCurve::at_positions(&limit, *force_n, *force, &contacts.positions)?;
         let judged = curve.points.iter().zip(&weights).filter(|(_, weight)| **weight > 0.0);
@@ -89,7 +89,7 @@ impl SensorProblem<'_> {
     }
 
     fn scores(&self, layout: &Layout) -> (f64, Option<f64>) {
-        let live = layout.sensors().iter().filter(|sensor| !sensor.channel.dead);
+        let live = layout.sensors().iter().filter(|sensor| !sensor.channel.disabled);
         let rows = self.sensitivity.rows(&live.map(SensorAt::from).collect::<Vec<_>>());
         let value = |dead: Option<usize>| {
             let left: Vec<&[Block]> = rows
@@ -180,8 +180,8 @@ impl SensorProblem<'_> {
         };
         let calibration = Calibration::new(&setup, Some(*force_n))
             .map_err(SimulateError::from)?
-            .pressed_at(&cells(extent, side, side), PRESSES)
-            .judged_at(&contacts.positions, READINGS.div_ceil(contacts.len()));
+            .with_presses(&cells(extent, side, side), PRESSES)
+            .with_contacts(&contacts.positions, READINGS.div_ceil(contacts.len()));
         let mut judged = Vec::new();
         for k in 0..calibrations as u64 {
             watch.stage("verifying", k as f64 / calibrations as f64)?;

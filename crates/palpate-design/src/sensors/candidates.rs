@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::design::{DesignError, Exclusion};
-use super::design::{FixedList, MustHave, SensorDesign, Sites, Supply, Symmetry};
+use super::design::{FixedList, RequiredSensor, SensorDesign, Sites, Supply, Symmetry};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{SensorKind, even_positions};
 use palpate_mechanics::surface::{Extent, Surface};
@@ -40,7 +40,7 @@ impl Candidates {
         let mut sensors = Vec::new();
         let offered = design.offers.iter().enumerate().filter(|(_, offer)| offer.supply == Supply::Any);
         for (offer, kind) in offered.map(|(i, offer)| (i, offer.kind)) {
-            let reads = |position: &Position| reads_something(surface, kind, *position);
+            let reads = |position: &Position| is_sensitive(surface, kind, *position);
             let at = |position: Position| PlacedSensor { offer, position };
             if kind == SensorKind::Reaction {
                 sensors.extend(surface.force_supports().into_iter().filter(reads).map(at));
@@ -59,14 +59,14 @@ impl Candidates {
 
     fn must_have(
         &mut self,
-        wanted: &MustHave,
+        wanted: &RequiredSensor,
         list: FixedList,
         surface: &dyn Surface,
         design: &SensorDesign,
     ) -> Result<(), DesignError> {
-        let MustHave { offer, position } = *wanted;
+        let RequiredSensor { offer, position } = *wanted;
         let (kind, extent) = (design.offers[offer].kind, surface.extent());
-        if !reads_something(surface, kind, position) {
+        if !is_sensitive(surface, kind, position) {
             return Err(DesignError::MustHaveReadsNothing { list, kind, position, extent });
         }
         if design.keeps_out(position, extent) && kind != SensorKind::Reaction {
@@ -76,7 +76,7 @@ impl Candidates {
         self.must_have.push(index);
         // The mirror image need not be one of the sites either.
         let twin = mirrored(position, extent);
-        let reads = !design.keeps_out(twin, extent) && reads_something(surface, kind, twin);
+        let reads = !design.keeps_out(twin, extent) && is_sensitive(surface, kind, twin);
         if design.symmetry == Symmetry::Wanted && reads {
             self.add(PlacedSensor { offer, position: twin }, extent);
         }
@@ -127,7 +127,7 @@ fn sites(sites: &Sites, extent: Extent) -> Vec<Position> {
     }
 }
 
-pub(super) fn reads_something(surface: &dyn Surface, kind: SensorKind, position: Position) -> bool {
+pub(super) fn is_sensitive(surface: &dyn Surface, kind: SensorKind, position: Position) -> bool {
     let still = surface.insensitive_sensor(kind, position).is_some();
     let carried = kind != SensorKind::Reaction || surface.is_supported_at(position);
     !still && carried && kind != SensorKind::Raw
@@ -225,7 +225,7 @@ impl Pool {
         self.units[unit].members().map(cost).sum()
     }
 
-    pub fn go_together(&self, a: usize, b: usize) -> bool {
+    pub fn are_compatible(&self, a: usize, b: usize) -> bool {
         // With very many candidates this is called very often.
         if a == b || excludes_nothing(&self.design) {
             return a != b;
@@ -247,16 +247,16 @@ impl Pool {
         let room = self.design.count - self.size(selection);
         let cost = self.cost(selection);
         let fits = |unit: &usize| {
-            self.leaves_pairs(room, *unit)
+            self.keeps_pairs(room, *unit)
                 && size.is_none_or(|size| size == self.units[*unit].size())
                 && self.is_affordable(cost, room, *unit)
-                && selection.iter().all(|other| self.go_together(*other, *unit))
+                && selection.iter().all(|other| self.are_compatible(*other, *unit))
         };
         among.iter().copied().filter(|unit| fits(unit)).collect()
     }
 
     /// Checks the room: a symmetric layout has pairs, and one middle sensor if its count is odd.
-    fn leaves_pairs(&self, room: usize, unit: usize) -> bool {
+    fn keeps_pairs(&self, room: usize, unit: usize) -> bool {
         let alone = self.units[unit].twin.is_none();
         room >= self.units[unit].size()
             && (self.design.symmetry != Symmetry::Wanted || !alone || !room.is_multiple_of(2))

@@ -40,9 +40,9 @@ pub struct SensorDesign {
     /// Zones without sensors. Reaction sensors are exempt.
     pub keep_out: Vec<KeepOut>,
     /// Sensors that every layout has.
-    pub must_have: Vec<MustHave>,
+    pub must_have: Vec<RequiredSensor>,
     /// Existing sensors that stay; the first of `must_have`.
-    pub kept: Vec<Sensor>,
+    pub fixed: Vec<Sensor>,
     /// Largest total cost; unlimited if `None`.
     pub budget: Option<f64>,
     /// Symmetry of the layouts.
@@ -105,7 +105,7 @@ pub struct KeepOut {
 
 impl KeepOut {
     /// Returns true inside the zone, with a margin for rounding.
-    pub fn holds(&self, position: Position, extent: Extent) -> bool {
+    pub fn contains(&self, position: Position, extent: Extent) -> bool {
         let slack_m = 1e-9 * extent.length_m();
         let inside = |at_m: f64, low_m: f64, high_m: f64| low_m + slack_m < at_m && at_m < high_m - slack_m;
         let across = extent.width_m().is_none_or(|_| inside(position.y_m, self.from.y_m, self.to.y_m));
@@ -115,7 +115,7 @@ impl KeepOut {
 
 /// A sensor that every layout has.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MustHave {
+pub struct RequiredSensor {
     /// Index of the offer.
     pub offer: usize,
     /// Position.
@@ -178,7 +178,7 @@ impl SensorDesign {
         let mut offers: Vec<SensorOffer> = Vec::new();
         for sensor in setup.layout().sensors() {
             if sensor.kind != SensorKind::Raw && offers.iter().all(|offer| offer.kind != sensor.kind) {
-                let channel = ChannelModel { dead: false, ..sensor.channel };
+                let channel = ChannelModel { disabled: false, ..sensor.channel };
                 offers.push(SensorOffer { kind: sensor.kind, channel, cost: 1.0, supply: Supply::Any });
             }
         }
@@ -190,14 +190,14 @@ impl SensorDesign {
             count: setup.layout().len(),
             offers,
             sites: Sites::Every(spacing(extent, SITES_ALONG_A_LINE, SITES_ALONG_A_PLANE)),
-            contacts: ContactPrior::all_over(extent),
+            contacts: ContactPrior::over_surface(extent),
             force: setup.force(),
             criterion: DesignCriterion::MeanLimit,
             tolerance_m: TOLERANCE_M,
             spacing_m: 0.0,
             keep_out: Vec::new(),
             must_have: Vec::new(),
-            kept: Vec::new(),
+            fixed: Vec::new(),
             budget: None,
             symmetry: Symmetry::Any,
         })
@@ -215,7 +215,7 @@ impl SensorDesign {
     /// [`DesignError::KeptDiffers`] for a sensor with other noise than its offer; [`LimitError::NoModel`] for
     /// a raw channel.
     pub fn adding(mut self, count: usize, today: &Layout) -> Result<Self, DesignError> {
-        let living = |sensor: &&Sensor| !sensor.channel.dead;
+        let living = |sensor: &&Sensor| !sensor.channel.disabled;
         let mut kept = Vec::new();
         for (sensor, number) in today.sensors().iter().zip(1..).filter(|(sensor, _)| living(sensor)) {
             let Sensor { kind, position, channel, .. } = *sensor;
@@ -231,10 +231,10 @@ impl SensorDesign {
             if self.offers[offer].channel != channel {
                 return Err(DesignError::KeptDiffers { number, kind });
             }
-            kept.push(MustHave { offer, position });
+            kept.push(RequiredSensor { offer, position });
         }
         let others = std::mem::take(&mut self.must_have);
-        self.kept = today.sensors().iter().filter(living).cloned().collect();
+        self.fixed = today.sensors().iter().filter(living).cloned().collect();
         self.count = kept.len() + count;
         self.must_have = kept;
         for wanted in others {
@@ -246,7 +246,7 @@ impl SensorDesign {
     }
 
     pub(super) fn list_of(&self, index: usize) -> FixedList {
-        if index < self.kept.len() { FixedList::Kept } else { FixedList::MustHave }
+        if index < self.fixed.len() { FixedList::Kept } else { FixedList::MustHave }
     }
 
     /// Sets the candidate sites.
@@ -273,7 +273,7 @@ impl SensorDesign {
     }
 
     pub(super) fn keeps_out(&self, position: Position, extent: Extent) -> bool {
-        self.keep_out.iter().any(|zone| zone.holds(position, extent))
+        self.keep_out.iter().any(|zone| zone.contains(position, extent))
     }
 
     pub(super) fn affords(&self, cost: f64) -> bool {

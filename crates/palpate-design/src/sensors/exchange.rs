@@ -27,13 +27,13 @@ const CHUNK: usize = 64;
 const MOST_ROUNDS: usize = 100;
 
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Found {
+pub(super) struct SearchResult {
     pub selection: Vec<usize>,
     pub score: f64,
 }
 
-impl Found {
-    pub fn or_better(self, other: Self) -> Self {
+impl SearchResult {
+    pub fn better_of(self, other: Self) -> Self {
         if other.score < self.score { other } else { self }
     }
 }
@@ -45,16 +45,16 @@ pub(super) struct Search<'a> {
     pub watch: Watch<'a>,
 }
 
-struct Without {
-    leaving: usize,
+struct Removal {
+    removed: usize,
     others: Vec<usize>,
     state: State,
 }
 
 impl Search<'_> {
-    pub fn scored(&self, selection: Vec<usize>) -> Found {
+    pub fn scored(&self, selection: Vec<usize>) -> SearchResult {
         let state = self.state(&selection, ForceBelief::Vague);
-        Found { score: self.objective.score(&state), selection }
+        SearchResult { score: self.objective.score(&state), selection }
     }
 
     pub fn state(&self, selection: &[usize], belief: ForceBelief) -> State {
@@ -64,7 +64,7 @@ impl Search<'_> {
     }
 
     /// Best layout of several starts; `feasible` meets all constraints.
-    pub fn greedy_exchange(&self, feasible: &[usize], seed: u64) -> Result<Found, Cancelled> {
+    pub fn greedy_exchange(&self, feasible: &[usize], seed: u64) -> Result<SearchResult, Cancelled> {
         if self.pool.units.len() <= SAMPLE {
             return self.best_of_starts(&self.pool.all(), feasible, seed);
         }
@@ -75,7 +75,12 @@ impl Search<'_> {
         self.exchange_among_many(found)
     }
 
-    fn best_of_starts(&self, among: &[usize], feasible: &[usize], seed: u64) -> Result<Found, Cancelled> {
+    fn best_of_starts(
+        &self,
+        among: &[usize],
+        feasible: &[usize],
+        seed: u64,
+    ) -> Result<SearchResult, Cancelled> {
         let starts = [self.greedy(among), even_start(self.pool, among), Some(feasible.to_vec())];
         let random = (0..RANDOM_STARTS).map(|k| random_start(self.pool, among, seed.wrapping_add(k)));
         let starts: Vec<Vec<usize>> = starts.into_iter().chain(random).flatten().collect();
@@ -83,13 +88,13 @@ impl Search<'_> {
         for (done, start) in starts.iter().enumerate() {
             self.watch.stage("greedy choice and exchange", done as f64 / starts.len() as f64)?;
             let found = self.exchange(among, start.clone())?;
-            best = found.or_better(best);
+            best = found.better_of(best);
         }
         Ok(best)
     }
 
     /// Alternates exchanges with neighbours and with all units.
-    fn exchange_among_many(&self, mut found: Found) -> Result<Found, Cancelled> {
+    fn exchange_among_many(&self, mut found: SearchResult) -> Result<SearchResult, Cancelled> {
         for _ in 0..MOST_ROUNDS {
             for _ in 0..MOST_ROUNDS {
                 let before = found.score;
@@ -112,9 +117,9 @@ impl Search<'_> {
 
     /// Finds the best exchange of each slot, best first. One pass serves all slots: fetching rows takes as
     /// long as evaluation.
-    fn best_of_each_slot(&self, found: &Found) -> Result<Vec<(usize, usize)>, Cancelled> {
+    fn best_of_each_slot(&self, found: &SearchResult) -> Result<Vec<(usize, usize)>, Cancelled> {
         let slots: Vec<usize> = (self.pool.fixed.len()..found.selection.len()).collect();
-        let without: Vec<Without> = slots.iter().map(|slot| self.without(found, *slot)).collect();
+        let without: Vec<Removal> = slots.iter().map(|slot| self.remove_slot(found, *slot)).collect();
         let mut bests: Vec<Option<(usize, f64)>> = vec![None; slots.len()];
         for chunk in self.pool.all().chunks(CHUNK) {
             self.watch.round()?;
@@ -144,7 +149,7 @@ impl Search<'_> {
         Some(selection)
     }
 
-    pub fn exchange(&self, among: &[usize], selection: Vec<usize>) -> Result<Found, Cancelled> {
+    pub fn exchange(&self, among: &[usize], selection: Vec<usize>) -> Result<SearchResult, Cancelled> {
         let mut found = self.scored(selection);
         let fixed = self.pool.fixed.len();
         let mut unchanged = 0;
@@ -162,10 +167,10 @@ impl Search<'_> {
     }
 
     /// Exchanges a unit for the best of equal size, if the relative gain exceeds `least_gain`.
-    fn exchange_one(&self, among: &[usize], found: &mut Found, slot: usize, least_gain: f64) -> bool {
-        let without = self.without(found, slot);
+    fn exchange_one(&self, among: &[usize], found: &mut SearchResult, slot: usize, least_gain: f64) -> bool {
+        let without = self.remove_slot(found, slot);
         let Some((unit, score)) = self.best_to_fill(&without, among) else { return false };
-        let improves = unit != without.leaving && score < found.score - least_gain * found.score.abs();
+        let improves = unit != without.removed && score < found.score - least_gain * found.score.abs();
         if improves {
             found.selection[slot] = unit;
             found.score = score;
@@ -173,14 +178,14 @@ impl Search<'_> {
         improves
     }
 
-    fn without(&self, found: &Found, slot: usize) -> Without {
+    fn remove_slot(&self, found: &SearchResult, slot: usize) -> Removal {
         let mut others = found.selection.clone();
         let leaving = others.remove(slot);
-        Without { leaving, state: self.state(&others, ForceBelief::Vague), others }
+        Removal { removed: leaving, state: self.state(&others, ForceBelief::Vague), others }
     }
 
-    fn best_to_fill(&self, without: &Without, among: &[usize]) -> Option<(usize, f64)> {
-        let size = self.pool.units[without.leaving].size();
+    fn best_to_fill(&self, without: &Removal, among: &[usize]) -> Option<(usize, f64)> {
+        let size = self.pool.units[without.removed].size();
         self.best_of(&without.state, &self.pool.joinable(&without.others, among, Some(size)))
     }
 
@@ -233,13 +238,13 @@ fn sample(pool: &Pool, size: usize, layout: &[usize]) -> Vec<usize> {
 ///
 /// # Errors
 /// The constraint that leaves too few sensors.
-pub(super) fn feasible(pool: &Pool) -> Result<Vec<usize>, DesignError> {
+pub(super) fn feasible_layout(pool: &Pool) -> Result<Vec<usize>, DesignError> {
     let mut order = pool.all();
     let cost = |unit: &usize| pool.cost(&[*unit]) / pool.units[*unit].size() as f64;
     let place = |unit: &usize| pool.sensors[pool.units[*unit].first].position;
     order.sort_by(|a, b| cost(a).total_cmp(&cost(b)).then(place(a).cmp_by_x_then_y(&place(b))));
     let selection = joined(pool, &order);
-    if pool.is_whole(&selection) { Ok(selection) } else { Err(why_not(pool, &order)) }
+    if pool.is_whole(&selection) { Ok(selection) } else { Err(infeasibility(pool, &order)) }
 }
 
 fn joined(pool: &Pool, order: &[usize]) -> Vec<usize> {
@@ -256,12 +261,12 @@ fn joined(pool: &Pool, order: &[usize]) -> Vec<usize> {
 }
 
 /// Unmet constraint: the budget, if a layout exists without it.
-fn why_not(pool: &Pool, order: &[usize]) -> DesignError {
+fn infeasibility(pool: &Pool, order: &[usize]) -> DesignError {
     let count = pool.design.count;
     let mut most = pool.fixed.clone();
     for unit in order {
         let fits = pool.size(&most) + pool.units[*unit].size() <= count;
-        if fits && most.iter().all(|other| pool.go_together(*other, *unit)) {
+        if fits && most.iter().all(|other| pool.are_compatible(*other, *unit)) {
             most.push(*unit);
         }
     }

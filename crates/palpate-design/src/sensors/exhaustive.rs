@@ -1,7 +1,7 @@
 //! Exhaustive search of few layouts.
 
 use super::candidates::Pool;
-use super::exchange::{Found, Search};
+use super::exchange::{Search, SearchResult};
 use super::objective::ForceBelief;
 use palpate_numerics::watch::Cancelled;
 
@@ -13,7 +13,7 @@ pub(super) fn layouts(pool: &Pool, slots: usize) -> f64 {
     (0..slots).map(|i| (free as f64 - i as f64) / (i as f64 + 1.0)).product::<f64>().max(0.0)
 }
 
-pub(super) fn search(search: &Search, slots: usize) -> Result<Option<Found>, Cancelled> {
+pub(super) fn search(search: &Search, slots: usize) -> Result<Option<SearchResult>, Cancelled> {
     let selection = search.pool.fixed.clone();
     if slots == 0 {
         return Ok(Some(search.scored(selection)));
@@ -27,7 +27,7 @@ struct Enumeration<'a> {
     search: &'a Search<'a>,
     slots: usize,
     selection: Vec<usize>,
-    best: Option<Found>,
+    best: Option<SearchResult>,
 }
 
 impl Enumeration<'_> {
@@ -37,7 +37,7 @@ impl Enumeration<'_> {
         let among: Vec<usize> = (first..count).collect();
         let joinable = self.search.pool.joinable(&self.selection, &among, None);
         if chosen + 1 == self.slots {
-            self.judge(&joinable);
+            self.score_selection(&joinable);
             return Ok(());
         }
         for unit in joinable {
@@ -51,14 +51,14 @@ impl Enumeration<'_> {
         Ok(())
     }
 
-    fn judge(&mut self, units: &[usize]) {
+    fn score_selection(&mut self, units: &[usize]) {
         let room = self.search.pool.design.count - self.search.pool.size(&self.selection);
         let state = self.search.state(&self.selection, ForceBelief::Vague);
         for unit in units.iter().filter(|unit| self.search.pool.units[**unit].size() == room) {
             let score = self.search.score_with(&state, *unit);
             if self.best.as_ref().is_none_or(|best| score < best.score) {
                 let selection = self.selection.iter().copied().chain([*unit]).collect();
-                self.best = Some(Found { selection, score });
+                self.best = Some(SearchResult { selection, score });
             }
         }
     }

@@ -7,7 +7,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::candidates::Pool;
-use super::exchange::{Found, Search, random_start};
+use super::exchange::{Search, SearchResult, random_start};
 use palpate_numerics::watch::Cancelled;
 
 pub(super) const STAGE: &str = "genetic search";
@@ -20,10 +20,10 @@ const TOURNAMENT: usize = 3;
 /// Probability of a mutation.
 const MUTATION: f64 = 0.4;
 
-pub(super) fn search(search: &Search, feasible: &[usize], seed: u64) -> Result<Found, Cancelled> {
+pub(super) fn search(search: &Search, feasible: &[usize], seed: u64) -> Result<SearchResult, Cancelled> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let (pool, all) = (search.pool, search.pool.all());
-    let mut population: Vec<Found> = (0..POPULATION)
+    let mut population: Vec<SearchResult> = (0..POPULATION)
         .map(|_| {
             let layout = random_start(pool, &all, rng.random()).unwrap_or_else(|| feasible.to_vec());
             search.scored(layout)
@@ -32,7 +32,7 @@ pub(super) fn search(search: &Search, feasible: &[usize], seed: u64) -> Result<F
     for generation in 0..GENERATIONS {
         search.watch.stage(STAGE, generation as f64 / GENERATIONS as f64)?;
         population.sort_by(|a, b| a.score.total_cmp(&b.score));
-        let mut next: Vec<Found> = population[..ELITE].to_vec();
+        let mut next: Vec<SearchResult> = population[..ELITE].to_vec();
         while next.len() < POPULATION {
             let [one, other] = [parent(&population, &mut rng), parent(&population, &mut rng)];
             // If the constraints leave no way to complete a child, a parent survives.
@@ -45,13 +45,13 @@ pub(super) fn search(search: &Search, feasible: &[usize], seed: u64) -> Result<F
     Ok(population.swap_remove(0))
 }
 
-fn parent<'a>(population: &'a [Found], rng: &mut impl Rng) -> &'a Found {
+fn parent<'a>(population: &'a [SearchResult], rng: &mut impl Rng) -> &'a SearchResult {
     let drawn = (0..TOURNAMENT).map(|_| rng.random_range(0..population.len())).collect::<Vec<_>>();
     let best = drawn.into_iter().min_by(|a, b| population[*a].score.total_cmp(&population[*b].score));
     &population[best.unwrap_or(0)]
 }
 
-fn child(pool: &Pool, one: &Found, other: &Found, rng: &mut impl Rng) -> Option<Vec<usize>> {
+fn child(pool: &Pool, one: &SearchResult, other: &SearchResult, rng: &mut impl Rng) -> Option<Vec<usize>> {
     let fixed = pool.fixed.len();
     let mut inherited: Vec<usize> = [&one.selection[fixed..], &other.selection[fixed..]].concat();
     for i in (1..inherited.len()).rev() {

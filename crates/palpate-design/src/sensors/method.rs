@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::candidates::reads_something;
+use super::candidates::is_sensitive;
 use super::design::DesignCriterion;
-use super::design::{DesignError, MustHave, SensorOffer, Supply};
-use super::exchange::{Found, Search};
+use super::design::{DesignError, RequiredSensor, SensorOffer, Supply};
+use super::exchange::{Search, SearchResult};
 use super::principal::{PrincipalComponents, Reconstruction};
 use super::sensitivity::SensorAt;
 use super::{Assessment, PlacedSensor, SensorProblem, exhaustive, genetic, pivoting, refine};
@@ -73,7 +73,7 @@ impl Method {
 
 /// Layout and its assessment.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Designed {
+pub struct AssessedLayout {
     /// Method of placement.
     pub method: Method,
     /// Sensors by kind in the order of the offers, left to right.
@@ -83,13 +83,13 @@ pub struct Designed {
 }
 
 /// Returns the search result with the best score.
-pub fn best_design(designed: &[Designed]) -> Option<&Designed> {
+pub fn best_design(designed: &[AssessedLayout]) -> Option<&AssessedLayout> {
     let searched = designed.iter().filter(|designed| designed.method.is_search());
     searched.min_by(|a, b| a.assessment.score.total_cmp(&b.assessment.score))
 }
 
 /// Selects the layouts to verify: references, and the best search result.
-pub fn to_verify(designed: &[Designed]) -> impl Iterator<Item = &Designed> {
+pub fn to_verify(designed: &[AssessedLayout]) -> impl Iterator<Item = &AssessedLayout> {
     let best = best_design(designed).map(|best| best.method);
     designed.iter().filter(move |designed| !designed.method.is_search() || Some(designed.method) == best)
 }
@@ -99,28 +99,28 @@ impl SensorProblem<'_> {
     ///
     /// # Errors
     /// As [`SensorProblem::assess`], or if cancelled.
-    pub fn all(&self, seed: u64, watch: Watch) -> Result<Vec<Designed>, DesignError> {
+    pub fn all(&self, seed: u64, watch: Watch) -> Result<Vec<AssessedLayout>, DesignError> {
         let even = self.even_if_any()?;
-        let is_even = |existing: &Designed| {
+        let is_even = |existing: &AssessedLayout| {
             let places = |layout: &Layout| -> Vec<_> {
                 layout.sensors().iter().map(|sensor| (sensor.kind, sensor.position)).collect()
             };
             even.as_ref().is_some_and(|even| places(&even.layout) == places(&existing.layout))
         };
         let existing = Some(self.existing()?).filter(|existing| !is_even(existing));
-        let mut designed: Vec<Designed> = even.into_iter().chain(existing).collect();
+        let mut designed: Vec<AssessedLayout> = even.into_iter().chain(existing).collect();
         let mut best = self.search(watch).greedy_exchange(&self.feasible, seed)?;
         designed.push(self.designed(Method::GreedyExchange, &best.selection)?);
         if exhaustive::layouts(&self.pool, self.free_slots()) <= exhaustive::MOST_LAYOUTS
             && let Some(found) = exhaustive::search(&self.search(watch), self.free_slots())?
         {
             designed.push(self.designed(Method::Exhaustive, &found.selection)?);
-            best = best.or_better(found);
+            best = best.better_of(found);
         }
         let found = self.genetic(seed, watch)?;
         designed.push(self.designed(Method::Genetic, &found.selection)?);
-        best = best.or_better(found);
-        designed.push(self.judged(Method::Refined, refine::refine(self, &best.selection, watch)?)?);
+        best = best.better_of(found);
+        designed.push(self.assess_layout(Method::Refined, refine::refine(self, &best.selection, watch)?)?);
         designed.extend(self.historical(seed, watch)?);
         Ok(designed)
     }
@@ -129,7 +129,7 @@ impl SensorProblem<'_> {
     ///
     /// # Errors
     /// As [`SensorProblem::all`], and [`DesignError::NoLayout`].
-    pub fn by_method(&self, method: Method, seed: u64, watch: Watch) -> Result<Designed, DesignError> {
+    pub fn by_method(&self, method: Method, seed: u64, watch: Watch) -> Result<AssessedLayout, DesignError> {
         let none = || DesignError::NoLayout { method: method.name() };
         let found = match method {
             Method::Even => return self.even(),
@@ -150,8 +150,8 @@ impl SensorProblem<'_> {
             Method::Genetic => self.genetic(seed, watch)?,
             Method::Refined => {
                 let exchanged = self.search(watch).greedy_exchange(&self.feasible, seed)?;
-                let best = exchanged.or_better(self.genetic(seed, watch)?);
-                return self.judged(method, refine::refine(self, &best.selection, watch)?);
+                let best = exchanged.better_of(self.genetic(seed, watch)?);
+                return self.assess_layout(method, refine::refine(self, &best.selection, watch)?);
             }
         };
         self.designed(method, &found.selection)
@@ -161,7 +161,7 @@ impl SensorProblem<'_> {
     ///
     /// # Errors
     /// As [`SensorProblem::all`].
-    pub fn greedy_exchange(&self, seed: u64, watch: Watch) -> Result<Designed, DesignError> {
+    pub fn greedy_exchange(&self, seed: u64, watch: Watch) -> Result<AssessedLayout, DesignError> {
         self.by_method(Method::GreedyExchange, seed, watch)
     }
 
@@ -169,11 +169,11 @@ impl SensorProblem<'_> {
     ///
     /// # Errors
     /// As [`SensorProblem::assess`], and [`DesignError::NoLayout`] if only reactions are offered.
-    pub fn even(&self) -> Result<Designed, DesignError> {
+    pub fn even(&self) -> Result<AssessedLayout, DesignError> {
         self.even_if_any()?.ok_or(DesignError::NoLayout { method: Method::Even.name() })
     }
 
-    pub(super) fn even_if_any(&self) -> Result<Option<Designed>, DesignError> {
+    pub(super) fn even_if_any(&self) -> Result<Option<AssessedLayout>, DesignError> {
         let design = &self.pool.design;
         let is_free = |offer: &SensorOffer| offer.kind != SensorKind::Reaction && offer.supply == Supply::Any;
         let Some(offer) = design.offers.iter().position(is_free) else {
@@ -187,14 +187,14 @@ impl SensorProblem<'_> {
             let Some(moved) = self.nearest_that_reads(&sensors, i) else { return Ok(None) };
             sensors[i] = moved;
         }
-        self.judged(Method::Even, sensors).map(Some)
+        self.assess_layout(Method::Even, sensors).map(Some)
     }
 
     /// Returns a sensor, or the nearest free candidate if it always reads 0.
     fn nearest_that_reads(&self, sensors: &[PlacedSensor], which: usize) -> Option<PlacedSensor> {
         let sensor = sensors[which];
         let kind = self.pool.design.offers[sensor.offer].kind;
-        if reads_something(self.sensitivity.surface, kind, sensor.position) {
+        if is_sensitive(self.sensitivity.surface, kind, sensor.position) {
             return Some(sensor);
         }
         let extent = self.pool.extent;
@@ -211,17 +211,17 @@ impl SensorProblem<'_> {
     }
 
     /// The setup's own layout.
-    fn existing(&self) -> Result<Designed, DesignError> {
+    fn existing(&self) -> Result<AssessedLayout, DesignError> {
         let layout = self.setup.layout().clone();
         let assessment = self.assess(&layout)?;
-        Ok(Designed { method: Method::Existing, layout, assessment })
+        Ok(AssessedLayout { method: Method::Existing, layout, assessment })
     }
 
     pub(super) fn search<'s>(&'s self, watch: Watch<'s>) -> Search<'s> {
         Search { pool: &self.pool, objective: &*self.objective, watch }
     }
 
-    fn genetic(&self, seed: u64, watch: Watch) -> Result<Found, Cancelled> {
+    fn genetic(&self, seed: u64, watch: Watch) -> Result<SearchResult, Cancelled> {
         genetic::search(&self.search(watch), &self.feasible, seed)
     }
 
@@ -229,7 +229,7 @@ impl SensorProblem<'_> {
         self.feasible.len() - self.pool.fixed.len()
     }
 
-    fn historical(&self, seed: u64, watch: Watch) -> Result<Vec<Designed>, DesignError> {
+    fn historical(&self, seed: u64, watch: Watch) -> Result<Vec<AssessedLayout>, DesignError> {
         let design = &self.pool.design;
         let mut designed = Vec::new();
         if design.criterion != DesignCriterion::DOptimality {
@@ -255,15 +255,22 @@ impl SensorProblem<'_> {
         Ok(designed)
     }
 
-    fn designed(&self, method: Method, selection: &[usize]) -> Result<Designed, DesignError> {
+    fn designed(&self, method: Method, selection: &[usize]) -> Result<AssessedLayout, DesignError> {
         let candidates = self.pool.candidates(selection);
-        self.judged(method, candidates.into_iter().map(|candidate| self.pool.sensors[candidate]).collect())
+        self.assess_layout(
+            method,
+            candidates.into_iter().map(|candidate| self.pool.sensors[candidate]).collect(),
+        )
     }
 
-    fn judged(&self, method: Method, sensors: Vec<PlacedSensor>) -> Result<Designed, DesignError> {
+    fn assess_layout(
+        &self,
+        method: Method,
+        sensors: Vec<PlacedSensor>,
+    ) -> Result<AssessedLayout, DesignError> {
         let layout = self.layout(sensors)?;
         let assessment = self.assess(&layout)?;
-        Ok(Designed { method, layout, assessment })
+        Ok(AssessedLayout { method, layout, assessment })
     }
 
     /// Builds a layout: kept sensors first, then by kind, left to right.
@@ -273,11 +280,11 @@ impl SensorProblem<'_> {
             let by_row = a.position.y_m.total_cmp(&b.position.y_m);
             by_offer.then(by_row).then(a.position.x_m.total_cmp(&b.position.x_m))
         });
-        let mut sensors = self.kept_among(&mut placed);
+        let mut sensors = self.take_fixed_sensors(&mut placed);
         for PlacedSensor { offer, position } in placed {
             let offer = &self.pool.design.offers[offer];
             let of_kind = sensors.iter().filter(|sensor| sensor.kind == offer.kind).count();
-            let channel = ChannelModel { dead: false, ..offer.channel };
+            let channel = ChannelModel { disabled: false, ..offer.channel };
             let mut names = (of_kind + 1..).map(|number| format!("{}_{number}", offer.kind));
             let is_free = |name: &String| sensors.iter().all(|sensor| sensor.name != *name);
             let name = names.find(is_free).unwrap_or_default();
@@ -287,23 +294,23 @@ impl SensorProblem<'_> {
     }
 
     /// Removes the kept sensors from `placed`, if all are placed.
-    fn kept_among(&self, placed: &mut Vec<PlacedSensor>) -> Vec<Sensor> {
+    fn take_fixed_sensors(&self, placed: &mut Vec<PlacedSensor>) -> Vec<Sensor> {
         let design = &self.pool.design;
-        let is_kept = |sensor: &PlacedSensor, wanted: &MustHave| {
+        let is_kept = |sensor: &PlacedSensor, wanted: &RequiredSensor| {
             let wanted = PlacedSensor { offer: wanted.offer, position: wanted.position };
             sensor.is_same(&wanted, self.pool.extent)
         };
-        let kept = &design.must_have[..design.kept.len()];
+        let kept = &design.must_have[..design.fixed.len()];
         if !kept.iter().all(|wanted| placed.iter().any(|sensor| is_kept(sensor, wanted))) {
             return Vec::new();
         }
         placed.retain(|sensor| !kept.iter().any(|wanted| is_kept(sensor, wanted)));
-        design.kept.clone()
+        design.fixed.clone()
     }
 
     /// Returns true for a kept sensor.
     pub fn is_kept(&self, sensor: &Sensor) -> bool {
-        let kept = &self.pool.design.kept;
+        let kept = &self.pool.design.fixed;
         kept.iter().any(|kept| kept.kind == sensor.kind && kept.position == sensor.position)
     }
 
@@ -314,7 +321,7 @@ impl SensorProblem<'_> {
             let some = Layout::new(sensors.cloned().collect()).ok();
             some.map_or_else(String::new, |layout| layout.places_in_words(self.pool.extent))
         };
-        if self.pool.design.kept.is_empty() || !layout.sensors().iter().any(|sensor| self.is_kept(sensor)) {
+        if self.pool.design.fixed.is_empty() || !layout.sensors().iter().any(|sensor| self.is_kept(sensor)) {
             return layout.places_in_words(self.pool.extent);
         }
         match words(true).as_str() {
@@ -324,8 +331,8 @@ impl SensorProblem<'_> {
     }
 
     /// Returns the existing layout if it is kept, else the even one.
-    pub fn reference<'d>(&self, designed: &'d [Designed]) -> Option<&'d Designed> {
-        let method = if self.pool.design.kept.is_empty() { Method::Even } else { Method::Existing };
+    pub fn reference<'d>(&self, designed: &'d [AssessedLayout]) -> Option<&'d AssessedLayout> {
+        let method = if self.pool.design.fixed.is_empty() { Method::Even } else { Method::Existing };
         designed.iter().find(|designed| designed.method == method)
     }
 }

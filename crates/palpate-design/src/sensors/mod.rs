@@ -44,9 +44,9 @@ pub use crate::verification::Verification;
 pub use assessment::{Assessment, CountPoint, enough};
 pub use candidates::PlacedSensor;
 pub(crate) use design::TOLERANCE_M;
-pub use design::{DesignCriterion, DesignError, Exclusion, FixedList, KeepOut, MustHave, SensorDesign};
+pub use design::{DesignCriterion, DesignError, Exclusion, FixedList, KeepOut, RequiredSensor, SensorDesign};
 pub use design::{SensorOffer, Sites, Supply, Symmetry};
-pub use method::{Designed, Method, best_design, to_verify};
+pub use method::{AssessedLayout, Method, best_design, to_verify};
 pub use pivoting::{condition_number, pivoted_columns};
 pub use sensitivity::DesignCost;
 
@@ -113,7 +113,7 @@ impl<'a> SensorProblem<'a> {
         design: &SensorDesign,
     ) -> Result<Self, DesignError> {
         let pool = Pool::new(candidates.clone(), design, sensitivity.surface.extent())?;
-        let feasible = exchange::feasible(&pool)?;
+        let feasible = exchange::feasible_layout(&pool)?;
         let objective = sensitivity.objective(Arc::clone(&table), design.criterion, design.tolerance_m);
         Ok(Self { setup, sensitivity, candidates, table, pool, objective, feasible })
     }

@@ -63,7 +63,7 @@ impl Reconstruction {
     }
 
     /// C·j, and 1 + jᵀ·C·j.
-    fn told(&self, state: &State, row: &[Block]) -> (Vec<f64>, f64) {
+    fn gain_and_variance(&self, state: &State, row: &[Block]) -> (Vec<f64>, f64) {
         let told: Vec<f64> = state.values.chunks_exact(self.blocks).map(|line| dot(line, row)).collect();
         let signal: f64 = told.iter().zip(row.iter().flatten()).map(|(a, b)| a * b).sum();
         (told, 1.0 + signal)
@@ -89,13 +89,13 @@ impl Objective for Reconstruction {
     }
 
     fn score_with(&self, state: &State, row: &[Block]) -> f64 {
-        let (told, shrink) = self.told(state, row);
+        let (told, shrink) = self.gain_and_variance(state, row);
         let gain: f64 = told.iter().map(|told| told * told).sum();
         (self.trace(state) - gain / shrink) / self.total()
     }
 
     fn updated(&self, state: &State, row: &[Block]) -> State {
-        let (told, shrink) = self.told(state, row);
+        let (told, shrink) = self.gain_and_variance(state, row);
         let mut with = state.clone();
         for (line, own) in with.values.chunks_exact_mut(self.blocks).zip(&told) {
             for (value, other) in line.iter_mut().flatten().zip(&told) {

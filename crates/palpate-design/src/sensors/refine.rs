@@ -1,7 +1,7 @@
 //! Sensor positions between the candidate sites.
 
 use super::SensorProblem;
-use super::candidates::{PlacedSensor, exclusion, mirrored, reads_something};
+use super::candidates::{PlacedSensor, exclusion, is_sensitive, mirrored};
 use super::design::Symmetry;
 use super::objective::{Block, ForceBelief, State};
 use palpate_mechanics::contact::Position;
@@ -124,7 +124,7 @@ fn is_allowed(problem: &SensorProblem, group: &[PlacedSensor], others: &[PlacedS
     let kind = |sensor: &PlacedSensor| pool.design.offers[sensor.offer].kind;
     group.iter().enumerate().all(|(i, sensor)| {
         !pool.design.keeps_out(sensor.position, pool.extent)
-            && reads_something(problem.sensitivity.surface, kind(sensor), sensor.position)
+            && is_sensitive(problem.sensitivity.surface, kind(sensor), sensor.position)
             && others.iter().chain(&group[..i]).all(|other| together(sensor, other))
     })
 }

@@ -76,7 +76,7 @@ impl Sensitivity<'_> {
     }
 
     /// Weights in the score; 0 for excluded contacts.
-    pub fn judged_weights(&self) -> Vec<f64> {
+    pub fn score_weights(&self) -> Vec<f64> {
         let WeightedContacts { positions, weights } = &self.contacts;
         let mut judged = weights.clone();
         let left_out = positions.iter().zip(&mut judged).filter(|(position, _)| !self.is_judged(**position));
@@ -134,7 +134,7 @@ impl Sensitivity<'_> {
 
     /// Rows of all candidates by the faster of two solvers.
     pub fn table(&self, candidates: &[SensorAt], watch: Watch) -> Result<Vec<Block>, DesignError> {
-        self.table_by(Solving::sooner(candidates.len(), self.contacts.len()), candidates, watch)
+        self.table_by(Solving::cheaper(candidates.len(), self.contacts.len()), candidates, watch)
     }
 
     pub(super) fn table_by(
@@ -197,7 +197,7 @@ impl Sensitivity<'_> {
         // Whitened readings, their transposed copy, and components.
         let snapshots = self.contacts.len().min(MOST_SNAPSHOTS);
         let readings = (3 * snapshots * candidates * size_of::<f64>()) as f64;
-        let solving = Solving::sooner(candidates, self.contacts.len());
+        let solving = Solving::cheaper(candidates, self.contacts.len());
         let (at_once, solutions) = match solving {
             Solving::BySensor => (TOGETHER, candidates),
             Solving::ByContact => (candidates, ContactLoad::EACH * (self.contacts.len() + snapshots)),
@@ -232,7 +232,7 @@ impl Sensitivity<'_> {
         tolerance_m: f64,
     ) -> Box<dyn Objective> {
         let sides_m: Vec<f64> = self.surface.extent().sides_m().collect();
-        let weights = &self.judged_weights();
+        let weights = &self.score_weights();
         match (self.force, sides_m.len()) {
             (Force::Known, 1) => {
                 Box::new(LimitObjective::<1, 0>::new(table, weights, &sides_m, criterion, tolerance_m))
@@ -252,7 +252,7 @@ impl Sensitivity<'_> {
     /// Whitened readings, a row per contact (a sample of many), times the root of its share.
     pub fn readings(&self, candidates: &[SensorAt], watch: Watch) -> Result<Array2<f64>, Cancelled> {
         let sample = self.contacts.sample(MOST_SNAPSHOTS);
-        self.readings_by(Solving::sooner(candidates.len(), sample.len()), candidates, &sample, watch)
+        self.readings_by(Solving::cheaper(candidates.len(), sample.len()), candidates, &sample, watch)
     }
 
     fn readings_by(
@@ -331,14 +331,14 @@ mod tests {
     }
 
     #[test]
-    fn sensors_and_contacts_solved_for_tell_the_same() {
+    fn solutions_by_sensor_and_by_contact_agree() {
         let setup = plate(12).setup;
         let surface = setup.surface().model().unwrap();
         let noisy = ChannelModel { noise_sd: 5e-6, ..ChannelModel::default() };
         let channels = [noisy, ChannelModel { noise_sd: 2e-6, range: Some((-2e-4, 2e-4)), ..noisy }];
         let candidates = sensors(&channels, surface.extent());
         let extent = surface.extent();
-        let prior = ContactPrior { every_m: 0.037, ..ContactPrior::all_over(extent) };
+        let prior = ContactPrior { every_m: 0.037, ..ContactPrior::over_surface(extent) };
         let contacts = WeightedContacts::from_prior(&prior, extent).unwrap();
         for force in [Force::Known, Force::Unknown] {
             let sensitivity = Sensitivity { surface, contacts: contacts.clone(), force_n: 5.0, force };
@@ -372,7 +372,7 @@ mod tests {
         let surface = setup.surface().model().unwrap();
         let channels = [ChannelModel { noise_sd: 5e-6, ..ChannelModel::default() }; 2];
         let candidates = sensors(&channels, surface.extent());
-        let prior = ContactPrior::all_over(surface.extent());
+        let prior = ContactPrior::over_surface(surface.extent());
         let contacts = WeightedContacts::from_prior(&prior, surface.extent()).unwrap();
         let sensitivity = Sensitivity { surface, contacts, force_n: 5.0, force: Force::Known };
         for solving in [Solving::BySensor, Solving::ByContact] {

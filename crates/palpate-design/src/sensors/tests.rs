@@ -1,4 +1,4 @@
-use super::exchange::Found;
+use super::exchange::SearchResult;
 use super::*;
 use crate::fixtures::{plate, sensor_design};
 use palpate_mechanics::contact::Position;
@@ -19,11 +19,11 @@ fn refusal(setup: &Setup, design: &SensorDesign) -> DesignError {
     SensorProblem::new(setup, design, Watch::NONE).map(|_| ()).unwrap_err()
 }
 
-fn exchanged(problem: &SensorProblem) -> Designed {
+fn exchanged(problem: &SensorProblem) -> AssessedLayout {
     problem.greedy_exchange(0, Watch::NONE).unwrap()
 }
 
-fn searched(problem: &SensorProblem) -> Found {
+fn searched(problem: &SensorProblem) -> SearchResult {
     problem.search(Watch::NONE).greedy_exchange(&problem.feasible, 0).unwrap()
 }
 
@@ -45,7 +45,7 @@ fn four_kinds() -> Vec<SensorOffer> {
     ]
 }
 
-fn places(designed: &Designed) -> Vec<f64> {
+fn places(designed: &AssessedLayout) -> Vec<f64> {
     designed.layout.sensors().iter().map(|sensor| (sensor.position.x_m * 1e3).round()).collect()
 }
 
@@ -139,7 +139,7 @@ fn every_search_keeps_every_constraint() {
     design.offers = four_kinds();
     design.spacing_m = 0.02;
     design.keep_out = vec![KeepOut { from: Position::along(0.09), to: Position::along(0.13) }];
-    design.must_have = vec![MustHave { offer: 0, position: Position::along(0.333) }];
+    design.must_have = vec![RequiredSensor { offer: 0, position: Position::along(0.333) }];
     design.budget = Some(24.0);
     for (symmetry, count) in [(Symmetry::Any, 6), (Symmetry::Wanted, 7), (Symmetry::Forbidden, 6)] {
         let design = SensorDesign { symmetry, count, ..design.clone() };
@@ -165,12 +165,12 @@ fn every_search_keeps_every_constraint() {
 }
 
 #[test]
-fn what_cannot_be_met_is_named() {
+fn unmet_constraint_is_named() {
     let (setup, base) = sensor_design();
     let spaced = SensorDesign { spacing_m: 0.06, ..base.clone() };
     let poor = SensorDesign { budget: Some(7.5), ..base.clone() };
     let few = SensorDesign { sites: Sites::Count(5), ..base.clone() };
-    let at = |x_m| MustHave { offer: 0, position: Position::along(x_m) };
+    let at = |x_m| RequiredSensor { offer: 0, position: Position::along(x_m) };
     let kept_out = vec![KeepOut { from: Position::along(0.1), to: Position::along(0.315) }];
     let must =
         |list: &[f64]| SensorDesign { must_have: list.iter().map(|x| at(*x)).collect(), ..base.clone() };
@@ -222,7 +222,7 @@ fn what_cannot_be_met_is_named() {
 }
 
 #[test]
-fn budgets_buy_what_helps_most() {
+fn budget_buys_the_most_useful_sensors() {
     let (setup, mut design) = sensor_design();
     design.offers = four_kinds();
     design.count = 4;
@@ -250,7 +250,7 @@ fn bridge() -> Setup {
 }
 
 #[test]
-fn contacts_over_supports_count_for_nothing_where_the_force_is_unknown() {
+fn contacts_over_supports_are_excluded_for_an_unknown_force() {
     let setup = bridge();
     let mut design = SensorDesign::for_setup(&setup).unwrap().unknown_force();
     design.sites = Sites::Every(1.0);
@@ -303,8 +303,9 @@ fn readings_without_principal_components_have_no_layouts_by_them() {
         let setup = sensor_design().0.known_force(force_n).unwrap();
         let design = SensorDesign { count: 3, ..SensorDesign::for_setup(&setup).unwrap() };
         let designed = problem(&setup, &design).all(0, Watch::NONE).unwrap();
-        let by_components =
-            |designed: &Designed| matches!(designed.method, Method::PrincipalComponents | Method::QrPivoting);
+        let by_components = |designed: &AssessedLayout| {
+            matches!(designed.method, Method::PrincipalComponents | Method::QrPivoting)
+        };
         assert!(!designed.is_empty() && !designed.iter().any(by_components), "{force_n} N");
     }
 }
@@ -350,7 +351,7 @@ fn no_exchange_for_one_of_very_many_matters() {
 }
 
 #[test]
-fn more_sensors_never_tell_less() {
+fn more_sensors_never_lower_the_information() {
     let (setup, design) = sensor_design();
     let points = problem(&setup, &design).counts(2..=6, 0, Watch::NONE).unwrap();
     assert!(points.windows(2).all(|pair| pair[1].designed.score < pair[0].designed.score));
@@ -381,7 +382,7 @@ fn plates_are_designed_too() {
 }
 
 #[test]
-fn a_layout_does_what_its_score_promises() {
+fn layout_reaches_its_score() {
     let (setup, mut design) = sensor_design();
     // Nearer to the ends force and position trade off, and the error is less than the limit of unbiased estimators.
     design.contacts = ContactPrior::along(0.03, 0.37, 0.02);

@@ -74,7 +74,7 @@ fn all_in_the_middle_leave_the_edges_empty() {
 }
 
 #[test]
-fn what_cannot_be_laid_out_is_refused_with_value_and_bound() {
+fn invalid_arrangement_is_refused_with_value_and_bound() {
     let explicit = |x_m| Arrangement::Explicit(vec![Position::along(0.1), Position::along(x_m)]);
     let refusals = [
         (Arrangement::Even, 0),

@@ -76,7 +76,7 @@ fn benches() -> Vec<(Setup, Recording)> {
 }
 
 #[test]
-fn contacts_of_every_method_have_a_force_where_the_locator_tells_one() {
+fn contacts_have_a_force_where_the_locator_estimates_it() {
     let mut told = Vec::new();
     for (setup, presses) in benches() {
         for locator in locators(&setup, &presses) {
@@ -84,9 +84,9 @@ fn contacts_of_every_method_have_a_force_where_the_locator_tells_one() {
             let estimates = touched.rows.iter().map(|row| locator.locate(&row.reading).unwrap());
             let found = estimates.filter(|estimate| estimate.status == Status::Located);
             let forces: Vec<Option<f64>> = found.map(|estimate| estimate.contact.force_n).collect();
-            let is_as_told = |force_n: &Option<f64>| force_n.is_some() == locator.tells_force();
+            let is_as_told = |force_n: &Option<f64>| force_n.is_some() == locator.estimates_force();
             assert!(!forces.is_empty() && forces.iter().all(is_as_told), "{}: {forces:?}", locator.kind());
-            told.push(locator.tells_force());
+            told.push(locator.estimates_force());
         }
     }
     assert!(told.contains(&true) && told.contains(&false), "{told:?}");
@@ -130,7 +130,7 @@ fn several_blocks() -> (Locator, Vec<f64>) {
 }
 
 #[test]
-fn the_first_bad_reading_is_named_whatever_the_number_of_threads() {
+fn first_bad_reading_is_named_for_any_number_of_threads() {
     let (locator, mut readings) = several_blocks();
     for (row, channel) in [(BLOCK + 7, 3), (BLOCK + 9, 0), (3 * BLOCK, 1)] {
         readings[8 * row + channel] = f64::NAN;
@@ -155,7 +155,7 @@ fn values_that_make_no_whole_readings_are_refused() {
 }
 
 #[test]
-fn a_watch_sees_every_block_and_stops_a_batch() {
+fn watch_counts_every_block_and_stops_a_batch() {
     let (locator, readings) = several_blocks();
     let rows = readings.len() / 8;
     let seen = Mutex::new(Vec::new());

@@ -71,26 +71,26 @@ impl Fit for Centroid {
         &self,
         FitTask { setup, recording, watch, .. }: FitTask,
     ) -> Result<CentroidLocator, CentroidFitError> {
-        let mut locator = uncalibrated(setup, recording)?;
+        let mut locator = fit_from_positions(setup, recording)?;
         recording.check_distinct_positions(locator.terms())?;
         locator.map = calibrate(&locator, &recording.rows)?;
-        locator.spread = HeldOutErrors::from_errors(&held_out_errors(&locator, recording, watch)?);
+        locator.held_out_errors = HeldOutErrors::from_errors(&held_out_errors(&locator, recording, watch)?);
         Ok(locator)
     }
 }
 
-fn uncalibrated(setup: &Setup, recording: &Recording) -> Result<CentroidLocator, CentroidFitError> {
+fn fit_from_positions(setup: &Setup, recording: &Recording) -> Result<CentroidLocator, CentroidFitError> {
     let sensors = setup.layout().sensors();
-    let live = sensors.iter().filter(|sensor| !sensor.channel.dead).count();
+    let live = sensors.iter().filter(|sensor| !sensor.channel.disabled).count();
     if live < 2 {
         return Err(CentroidFitError::TooFewSensors { found: live });
     }
     let channel_scale = |sensor: &Sensor| {
-        if sensor.channel.dead {
+        if sensor.channel.disabled {
             return Ok(0.0);
         }
         let of_kind =
-            (0..sensors.len()).filter(|i| sensors[*i].kind == sensor.kind && !sensors[*i].channel.dead);
+            (0..sensors.len()).filter(|i| sensors[*i].kind == sensor.kind && !sensors[*i].channel.disabled);
         let readings = of_kind.flat_map(|i| recording.rows.iter().map(move |row| row.reading[i].abs()));
         let scale = 1.0 / readings.fold(0.0, f64::max);
         if scale.is_finite() { Ok(scale) } else { Err(CentroidFitError::Silent { kind: sensor.kind }) }
@@ -98,9 +98,9 @@ fn uncalibrated(setup: &Setup, recording: &Recording) -> Result<CentroidLocator,
     let channel_scales = sensors.iter().map(channel_scale).collect::<Result<_, _>>()?;
     let raw = sensors.iter().any(|sensor| sensor.kind == SensorKind::Raw);
     let weighing = if raw {
-        Weighing::Channels
+        Weighting::Channels
     } else {
-        Weighing::Positions(sensors.iter().map(|sensor| sensor.position).collect())
+        Weighting::Positions(sensors.iter().map(|sensor| sensor.position).collect())
     };
     Ok(CentroidLocator {
         extent: setup.surface().extent(),
@@ -108,7 +108,7 @@ fn uncalibrated(setup: &Setup, recording: &Recording) -> Result<CentroidLocator,
         weighing,
         map: Vec::new(),
         force_n: setup.force_n(),
-        spread: None,
+        held_out_errors: None,
     })
 }
 
@@ -169,20 +169,21 @@ pub struct CentroidLocator {
     /// Inverse of the kind's largest training reading; 0 for a disabled channel.
     pub channel_scales: Vec<f64>,
     /// Points of the centroid.
-    pub weighing: Weighing,
-    /// Row per coordinate: factors and a constant ([`Weighing::Positions`]), or a position per channel
-    /// ([`Weighing::Channels`]), in metres.
+    pub weighing: Weighting,
+    /// Row per coordinate: factors and a constant ([`Weighting::Positions`]), or a position per channel
+    /// ([`Weighting::Channels`]), in metres.
     pub map: Vec<Vec<f64>>,
     /// Known force.
     pub force_n: Option<f64>,
     /// Cross-validated errors.
-    pub spread: Option<HeldOutErrors>,
+    #[serde(rename = "spread")]
+    pub held_out_errors: Option<HeldOutErrors>,
 }
 
 /// Points of the centroid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Weighing {
+pub enum Weighting {
     /// Known sensor positions.
     Positions(Vec<Position>),
     /// Calibrated positions of raw channels.
@@ -192,8 +193,8 @@ pub enum Weighing {
 impl CentroidLocator {
     fn terms(&self) -> usize {
         match self.weighing {
-            Weighing::Positions(_) => 1 + self.extent.dimensions(),
-            Weighing::Channels => self.channel_scales.len(),
+            Weighting::Positions(_) => 1 + self.extent.dimensions(),
+            Weighting::Channels => self.channel_scales.len(),
         }
     }
 
@@ -205,7 +206,7 @@ impl CentroidLocator {
             return None;
         }
         weights.iter_mut().for_each(|weight| *weight /= total);
-        let Weighing::Positions(positions) = &self.weighing else { return Some(weights) };
+        let Weighting::Positions(positions) = &self.weighing else { return Some(weights) };
         let mean = |coordinate: fn(&Position) -> f64| {
             weights.iter().zip(positions).map(|(w, p)| w * coordinate(p)).sum::<f64>()
         };
@@ -231,7 +232,7 @@ impl Locate for CentroidLocator {
         let Some(position) = self.position(reading) else {
             return NO_CONTACT;
         };
-        let uncertainty = self.spread.map(|spread| spread.uncertainty(position));
+        let uncertainty = self.held_out_errors.map(|spread| spread.uncertainty(position));
         on_surface(ContactEstimate { position, force_n: self.force_n, uncertainty }, self.extent)
     }
 
@@ -240,7 +241,7 @@ impl Locate for CentroidLocator {
         LocatorFault::check_count("channel scales", channels, self.channel_scales.len())?;
         let scales = &self.channel_scales;
         LocatorFault::check_numbers("channel scale", scales, |scale| scale >= 0.0, "a number of at least 0")?;
-        if let Weighing::Positions(positions) = &self.weighing {
+        if let Weighting::Positions(positions) = &self.weighing {
             LocatorFault::check_count("sensor positions", channels, positions.len())?;
             let coordinates = positions.iter().flat_map(|p| [p.x_m, p.y_m]);
             LocatorFault::check_numbers("sensor position", coordinates, |_| true, "a finite number")?;
@@ -250,7 +251,7 @@ impl Locate for CentroidLocator {
             LocatorFault::check_count("numbers in a row of the map", self.terms(), row.len())?;
             LocatorFault::check_numbers("map", row, |_| true, "a finite number")?;
         }
-        self.spread.map_or(Ok(()), |spread| spread.check())
+        self.held_out_errors.map_or(Ok(()), |spread| spread.check())
     }
 }
 

@@ -85,14 +85,14 @@ fn raw_channels_find_their_positions() {
 }
 
 #[test]
-fn nothing_read_is_no_contact() {
+fn zero_reading_is_no_contact() {
     let rows = (1..20).map(|i| lever(0.02 * f64::from(i), 3.0)).collect();
     let nothing: Estimate = fit(&scales(), rows).unwrap().locate(&[0.0, 0.0]);
     assert_eq!(nothing.status, Status::NoContact);
 }
 
 #[test]
-fn beyond_the_edge_is_said() {
+fn position_beyond_the_edge_is_reported() {
     let rows = (1..20).map(|i| lever(0.02 * f64::from(i), 3.0)).collect();
     let mut locator = fit(&scales(), rows).unwrap();
     locator.map[0][1] += 0.1;
@@ -100,7 +100,7 @@ fn beyond_the_edge_is_said() {
 }
 
 #[test]
-fn what_does_not_calibrate_is_named() {
+fn uncalibratable_recordings_are_refused() {
     let message = |setup: &Setup, rows| fit(setup, rows).unwrap_err().to_string();
     let mut setup = scales();
     let rows: Vec<Row> = (1..20).map(|i| lever(0.02 * f64::from(i), 3.0)).collect();
@@ -113,7 +113,7 @@ fn what_does_not_calibrate_is_named() {
         message(&setup, silent),
         "every reaction reading of the recording is 0; a centroid weights sensors by their readings"
     );
-    setup.set_dead(0, true);
+    setup.set_disabled(0, true);
     assert_eq!(
         message(&setup, rows),
         "a centroid needs at least 2 sensors that are not dead; the layout has 1"

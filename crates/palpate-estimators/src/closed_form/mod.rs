@@ -6,14 +6,14 @@ mod polynomial;
 
 use serde::{Deserialize, Serialize};
 
+use crate::distributed_contact::{BoundedContact, distributed_contact_bound, distributed_contact_score};
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
 use crate::force_prior::DECADE;
 use crate::model_offsets::{check_offsets, less_offsets, offsets_of};
 use crate::recording::Recording;
 use crate::setup::Setup;
-use crate::spread::{About, spread_bound, spread_score};
 use crate::status::{
-    FalseAlarmRate, LINE_PLACES, NO_CONTACT, OTHER_PLACE, StatusRule, misfit_bound, unknowns,
+    FalseAlarmRate, LINE_PLACES, NO_CONTACT, OTHER_PLACE, StatusRule, chi_squared_bound, unknowns,
 };
 use crate::trade_off::{Contacts, Force, interval_on_line_95, is_near_end};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
@@ -114,7 +114,7 @@ impl Fit for ClosedForm {
             },
             false_alarm_rate: self.false_alarm_rate,
         };
-        let (needed, found) = (unknowns(1, setup.force_n()), locator.seeing().len());
+        let (needed, found) = (unknowns(1, setup.force_n()), locator.sensitive_sensors().len());
         if found < needed { Err(ClosedFormFitError::TooFewSensors { needed, found }) } else { Ok(locator) }
     }
 }
@@ -141,18 +141,18 @@ pub struct ClosedFormLocator {
 }
 
 impl ClosedFormLocator {
-    fn seeing(&self) -> Vec<usize> {
+    fn sensitive_sensors(&self) -> Vec<usize> {
         let sees = |sensor: &Sensor| {
             let quarters = [0.25, 0.5, 0.75].map(|share| Position::along(share * self.beam.length_m()));
             let influence = |contact: Position| self.beam.influence(sensor.kind, sensor.position, contact);
-            !sensor.channel.dead && quarters.into_iter().any(|contact| influence(contact) != 0.0)
+            !sensor.channel.disabled && quarters.into_iter().any(|contact| influence(contact) != 0.0)
         };
         (0..self.layout.len()).filter(|i| sees(&self.layout.sensors()[*i])).collect()
     }
 
     /// True where the layout gives all noise, which detection needs.
-    pub fn knows_noise(&self) -> bool {
-        self.weights(&self.seeing()).1 == Noise::Known
+    pub fn has_known_noise(&self) -> bool {
+        self.weights(&self.sensitive_sensors()).1 == Noise::Known
     }
 
     /// 1/σ where all noise is known, else 1/full scale.
@@ -214,7 +214,7 @@ impl ClosedFormLocator {
         };
         let misfit_n = left_n + right_n - force_n;
         let tolerated = match noise {
-            Noise::Known => misfit_bound(1) * (var_left + var_right),
+            Noise::Known => chi_squared_bound(1) * (var_left + var_right),
             Noise::Unknown => (0.1 * force_n).powi(2),
         };
         let sd_m = covariance[0].sqrt();
@@ -250,7 +250,7 @@ impl Locate for ClosedFormLocator {
     type Check = NoCheck;
 
     fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
-        self.knows_noise().then_some(self.false_alarm_rate)
+        self.has_known_noise().then_some(self.false_alarm_rate)
     }
 
     fn offsets(&self) -> Option<Vec<f64>> {
@@ -259,7 +259,7 @@ impl Locate for ClosedFormLocator {
 
     fn locate(&self, reading: &[f64]) -> Estimate {
         let reading = &*less_offsets(reading, &self.offsets);
-        let channels = self.seeing();
+        let channels = self.sensitive_sensors();
         let (weights, noise) = self.weights(&channels);
         let whitened: Vec<f64> = channels.iter().zip(&weights).map(|(i, w)| w * reading[*i]).collect();
         let size: f64 = whitened.iter().map(|r| r * r).sum();
@@ -309,7 +309,7 @@ impl Locate for ClosedFormLocator {
             |x| x > 0.0,
             "a number greater than 0",
         )?;
-        let (needed, found) = (unknowns(1, self.force_n), self.seeing().len());
+        let (needed, found) = (unknowns(1, self.force_n), self.sensitive_sensors().len());
         if found < needed {
             return Err(LocatorFault::Count { what: "sensors that see a contact", needed, found });
         }
@@ -355,7 +355,7 @@ impl Posterior<'_> {
             return estimate;
         }
         let mut estimate = Estimate::of_contact(self.contact(best), Status::Located);
-        if best.force_n <= 0.0 || !rule.is_explained(best.chi_squared) || self.is_spread(&found) {
+        if best.force_n <= 0.0 || !rule.is_explained(best.chi_squared) || self.is_distributed(&found) {
             estimate.status = Status::OutsideModel;
             return estimate;
         }
@@ -408,29 +408,30 @@ impl Posterior<'_> {
             estimate.status = Status::Ambiguous;
         }
         let is_pull = estimate.contact.force_n.is_none_or(|force_n| force_n <= 0.0);
-        if is_pull || !rule.is_explained(open.misfit) || self.is_spread(found) {
+        if is_pull || !rule.is_explained(open.misfit) || self.is_distributed(found) {
             estimate.status = Status::OutsideModel;
         }
         Some(estimate)
     }
 
-    fn is_spread(&self, found: &[Explanation]) -> bool {
+    fn is_distributed(&self, found: &[Explanation]) -> bool {
         let least = found.iter().fold(f64::INFINITY, |least, at| least.min(at.chi_squared));
         let competes = |at: &&Explanation| at.chi_squared <= least + NEGLIGIBLE;
-        let bound = spread_bound(1);
+        let bound = distributed_contact_bound(1);
         // The squared residual is at least its component along the test direction.
-        let is_spread = |at: &Explanation| at.chi_squared > bound && self.spread(at) > bound;
+        let is_spread =
+            |at: &Explanation| at.chi_squared > bound && self.distributed_contact_score(at) > bound;
         self.noise == Noise::Known && found.iter().filter(competes).all(is_spread)
     }
 
-    fn spread(&self, Explanation { position_m, force_n, .. }: &Explanation) -> f64 {
+    fn distributed_contact_score(&self, Explanation { position_m, force_n, .. }: &Explanation) -> f64 {
         let reads = |[x_m, _, force_n]: [f64; 3]| -> Vec<f64> {
             self.influence_at(x_m).iter().map(|(f, _)| force_n * f).collect()
         };
         let force_ends = self.force_n.map_or((0.0, f64::INFINITY), |force_n| (force_n, force_n));
         let at = [*position_m, 0.0, *force_n];
-        let about = About { at, ends: [(0.0, self.length_m()), (0.0, 0.0), force_ends] };
-        spread_score(about, self.reading.iter().copied(), reads)
+        let about = BoundedContact { at, ends: [(0.0, self.length_m()), (0.0, 0.0), force_ends] };
+        distributed_contact_score(about, self.reading.iter().copied(), reads)
     }
 
     fn influence_at(&self, x_m: f64) -> Vec<(f64, f64)> {

@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn mirroring_and_dividing_do_what_they_say() {
+    fn mirroring_and_division_meet_their_definitions() {
         let p = Polynomial(vec![0.0, -1.3, 2.0, 4.1]);
         for t in [0.0, 0.2, 0.9] {
             assert!((p.mirrored().value_at(t) - p.value_at(1.0 - t)).abs() < 1e-14);

@@ -101,7 +101,7 @@ fn clean_deflections_give_every_position_at_known_force() {
 }
 
 #[test]
-fn one_sensor_sees_the_mirror_image_and_says_so() {
+fn one_sensor_reports_the_mirror_image_as_a_mode() {
     let setup = setup(&even(SensorKind::Deflection, 1), 5e-6, Some(3.0));
     let estimate = fit(&setup).unwrap().locate(&clean(&setup, 0.1, 3.0));
     assert_eq!(estimate.status, Status::Ambiguous);
@@ -111,7 +111,7 @@ fn one_sensor_sees_the_mirror_image_and_says_so() {
 }
 
 #[test]
-fn two_strains_see_between_them_and_are_blind_outside() {
+fn two_strains_locate_only_between_them() {
     let setup = setup(&even(SensorKind::Strain, 2), 1e-7, None);
     let locator = fit(&setup).unwrap();
     for x_mm in (140..=260).step_by(10) {
@@ -166,7 +166,7 @@ fn noise_spreads_as_much_as_was_propagated() {
 }
 
 #[test]
-fn what_no_contact_explains_is_not_located() {
+fn unexplained_reading_is_not_located() {
     let deflections = setup(&even(SensorKind::Deflection, 8), 5e-6, None);
     let locator = fit(&deflections).unwrap();
     assert_eq!(locator.locate(&[3e-6, -4e-6, 1e-6, 0.0, 2e-6, -6e-6, 5e-6, 1e-6]).status, Status::NoContact);
@@ -186,9 +186,9 @@ fn what_no_contact_explains_is_not_located() {
 }
 
 #[test]
-fn a_dead_channel_is_left_out() {
+fn disabled_channel_is_excluded() {
     let mut deflections = setup(&even(SensorKind::Deflection, 8), 5e-6, None);
-    deflections.set_dead(3, true);
+    deflections.set_disabled(3, true);
     let mut reading = clean(&deflections, 0.17, 3.0);
     reading[3] = 0.0;
     let estimate = fit(&deflections).unwrap().locate(&reading);
@@ -197,7 +197,7 @@ fn a_dead_channel_is_left_out() {
 }
 
 #[test]
-fn what_does_not_suit_is_named() {
+fn unsuitable_setup_is_refused() {
     let message = |setup: &Setup| fit(setup).unwrap_err().to_string();
     let layout = setup(&SCALES, 0.0, None).layout().clone();
     let measured = Setup::new(Extent::line(0.4).unwrap()).with_layout(layout).unwrap();

@@ -1,8 +1,8 @@
 //! Descriptions of locators.
 
-use super::learnt::{decimals, learnt};
-use crate::centroid::Weighing;
-use crate::estimator::{Locator, Method, Tried};
+use super::parameters::{decimals, parameter_lines};
+use crate::centroid::Weighting;
+use crate::estimator::{CandidateErrors, Locator, Method};
 use crate::influence::InfluenceLocator;
 use crate::influence::measured::{MeasuredLocator, NuisanceRole};
 use crate::interval_check::{Coverage, IntervalCheck, UNBOUNDED};
@@ -54,8 +54,8 @@ pub fn locator(locator: &Locator) -> Vec<String> {
 }
 
 /// Describes the choice and its margin.
-pub fn choice(tried: &[Tried]) -> Option<String> {
-    let figures = |one: &Tried| {
+pub fn choice(tried: &[CandidateErrors]) -> Option<String> {
+    let figures = |one: &CandidateErrors| {
         let [error, score] = [one.mean_error_m, one.interval_score_m].map(format_length_mm);
         format!("{} (mean error {error}, interval score {score})", one.name)
     };
@@ -148,7 +148,7 @@ fn method(locator: &Locator) -> Vec<String> {
             plane.table().rows
         )],
         Method::Influence(InfluenceLocator::ForceLinear(linear)) => {
-            learnt(linear, &locator.setup.layout().names())
+            parameter_lines(linear, &locator.setup.layout().names())
         }
         Method::Influence(InfluenceLocator::Measured(measured)) => vec![free(measured)],
         Method::NetworkLm(networks) => networks
@@ -177,8 +177,8 @@ fn method(locator: &Locator) -> Vec<String> {
             vec![format!("the {} nearest of {} presses", neighbours.count, neighbours.rows.len())]
         }
         Method::Centroid(centroid) => vec![match centroid.weighing {
-            Weighing::Positions(_) => "the centroid of the sensors' positions, calibrated".to_owned(),
-            Weighing::Channels => "the centroid of the channels at calibrated positions".to_owned(),
+            Weighting::Positions(_) => "the centroid of the sensors' positions, calibrated".to_owned(),
+            Weighting::Channels => "the centroid of the channels at calibrated positions".to_owned(),
         }],
     }
 }

@@ -1,10 +1,10 @@
 //! Descriptions, one line per fact.
 
-mod learnt;
 mod locator;
+mod parameters;
 
-pub use learnt::{learnt, learnt_summary, noise_is_hardly_told};
 pub use locator::{choice, interval_check, locator};
+pub use parameters::{noise_is_hardly_told, parameter_lines, summary_lines};
 
 use crate::arrangement::{Arrangement, Training};
 use crate::recording::Recording;

@@ -21,7 +21,7 @@ use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::{Digit, Elastica, Surface, SurfaceSpec};
 use palpate_numerics::small::Ldl;
 use palpate_numerics::watch::Cancelled;
-use palpate_numerics::{bisect, clamped_interval, holding, normal_cdf, normal_interval_95};
+use palpate_numerics::{bisect, clamped_interval, extend_to, normal_cdf, normal_interval_95};
 
 /// Maximum-likelihood estimator of a flexible digit, without training.
 ///
@@ -137,12 +137,12 @@ impl Fit for DigitEstimator {
         };
         let noiseless = |sensor: &Sensor| {
             let sd = sensor.channel.reading_sd();
-            !(sensor.channel.dead || sd > 0.0 && sd.is_finite())
+            !(sensor.channel.disabled || sd > 0.0 && sd.is_finite())
         };
         if let Some(i) = locator.layout.sensors().iter().position(noiseless) {
             return Err(DigitFitError::NoNoise { gauge: i + 1 });
         }
-        let (needed, found) = (unknowns(1, force_n), locator.living().count());
+        let (needed, found) = (unknowns(1, force_n), locator.enabled_sensors().count());
         if found < needed {
             return Err(DigitFitError::TooFewGauges { needed, found });
         }
@@ -210,17 +210,17 @@ impl DigitLocator {
     pub fn leave_out(&mut self, gauge: usize) -> bool {
         let needed = unknowns(1, self.force_n);
         let Some(sensor) = self.layout.sensors().get(gauge) else { return false };
-        let was_dead = sensor.channel.dead;
-        self.layout.set_dead(gauge, true);
-        let enough = self.living().count() >= needed;
+        let was_dead = sensor.channel.disabled;
+        self.layout.set_disabled(gauge, true);
+        let enough = self.enabled_sensors().count() >= needed;
         if !enough {
-            self.layout.set_dead(gauge, was_dead);
+            self.layout.set_disabled(gauge, was_dead);
         }
         enough
     }
 
-    fn living(&self) -> impl Iterator<Item = &Sensor> {
-        self.layout.sensors().iter().filter(|sensor| !sensor.channel.dead)
+    fn enabled_sensors(&self) -> impl Iterator<Item = &Sensor> {
+        self.layout.sensors().iter().filter(|sensor| !sensor.channel.disabled)
     }
 
     fn estimate(&self, mut posterior: Posterior, rule: &StatusRule) -> Estimate {
@@ -279,7 +279,7 @@ impl Locate for DigitLocator {
     fn locate(&self, reading: &[f64]) -> Estimate {
         let gauges = gauges(&self.layout, reading, &less_offsets(reading, &self.offsets));
         let size: f64 = gauges.iter().map(|gauge| (gauge.strain / gauge.sd).powi(2)).sum();
-        let none_saturated = gauges.len() == self.living().count();
+        let none_saturated = gauges.len() == self.enabled_sensors().count();
         let rule =
             StatusRule::new(gauges.len(), unknowns(1, self.force_n), LINE_PLACES, self.false_alarm_rate);
         let is_no_contact = |misfit: f64| none_saturated && rule.is_no_contact(size, misfit);
@@ -305,10 +305,10 @@ impl Locate for DigitLocator {
         let places = self.layout.sensors().iter().map(|sensor| sensor.position.x_m);
         let on_digit = |x: f64| self.digit.contains(Position::along(x));
         LocatorFault::check_numbers("gauge position", places, on_digit, "on the digit")?;
-        let noise = self.living().map(|sensor| sensor.channel.reading_sd());
+        let noise = self.enabled_sensors().map(|sensor| sensor.channel.reading_sd());
         LocatorFault::check_numbers("gauge noise", noise, |sd| sd > 0.0, "a number greater than 0")?;
         LocatorFault::check_numbers("force", self.force_n, |x| x > 0.0, "a number greater than 0")?;
-        let (needed, found) = (unknowns(1, self.force_n), self.living().count());
+        let (needed, found) = (unknowns(1, self.force_n), self.enabled_sensors().count());
         if found < needed {
             return Err(LocatorFault::Count { what: "living gauges", needed, found });
         }
@@ -327,7 +327,7 @@ struct Posterior {
 #[derive(Clone, Debug)]
 struct Piece {
     /// For a curve, the median.
-    best: Guess,
+    best: PointContact,
     chi_squared: f64,
     covariance: [f64; 3],
     probability: f64,
@@ -405,7 +405,7 @@ impl Posterior {
         if length_m - high_m < width_m {
             shortest = shorter(shortest, (quantile_m(0.05), length_m));
         }
-        holding(shortest, estimate_m)
+        extend_to(shortest, estimate_m)
     }
 
     fn quantile_m(&self, share: f64, length_m: f64) -> f64 {
@@ -493,12 +493,12 @@ fn curve(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
     let median = &points[shares.iter().position(|share| *share >= 0.5)?];
     let mean =
         |of: &dyn Fn(&CurvePoint) -> f64| points.iter().map(|point| weight(point) * of(point)).sum::<f64>();
-    let (mean_m, mean_n) = (mean(&|point| point.guess.position_m), mean(&|point| point.guess.force_n));
-    let off_m = |point: &CurvePoint| point.guess.position_m - mean_m;
-    let off_n = |point: &CurvePoint| point.guess.force_n - mean_n;
+    let (mean_m, mean_n) = (mean(&|point| point.point.position_m), mean(&|point| point.point.force_n));
+    let off_m = |point: &CurvePoint| point.point.position_m - mean_m;
+    let off_n = |point: &CurvePoint| point.point.force_n - mean_n;
     let step_m = (stretch.to_m - stretch.from_m) / CURVE_POINTS as f64;
     Some(Piece {
-        best: median.guess,
+        best: median.point,
         chi_squared: median.chi_squared,
         covariance: [
             mean(&|point| off_m(point).powi(2)) + step_m * step_m / 12.0,
@@ -512,7 +512,7 @@ fn curve(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
 }
 
 struct CurvePoint {
-    guess: Guess,
+    point: PointContact,
     chi_squared: f64,
     force_variance: f64,
     log_weight: f64,
@@ -525,13 +525,13 @@ fn curve_points(likelihood: &Likelihood, stretch: Stretch) -> Vec<CurvePoint> {
     let mut point = |i: usize| {
         let position_m = stretch.from_m + (i as f64 + 0.5) * step_m;
         let start_n = force_n.max(0.0).min(likelihood.most_force_n(position_m));
-        let start = Guess { position_m, force_n: start_n };
+        let start = PointContact { position_m, force_n: start_n };
         let (guess, fit) = refine(likelihood, stretch, start, |(_, fit)| force_step(fit));
         force_n = guess.force_n;
         let force_variance = 1.0 / fit.information[1][1];
         let volume = (TAU * force_variance).sqrt() / guess.force_n * step_m;
         let log_weight = -0.5 * fit.misfit + volume.ln();
-        CurvePoint { guess, chi_squared: fit.misfit, force_variance, log_weight }
+        CurvePoint { point: guess, chi_squared: fit.misfit, force_variance, log_weight }
     };
     let mut points: Vec<CurvePoint> = (0..CURVE_POINTS).rev().map(&mut point).collect();
     points.reverse();
@@ -555,7 +555,8 @@ struct Stretch {
 fn gauges(layout: &Layout, reading: &[f64], strains: &[f64]) -> Vec<Gauge> {
     // Converters saturate by the sum of offset and strain.
     let inside = |((sensor, read), _): &((&Sensor, &f64), f64)| {
-        !sensor.channel.dead && sensor.channel.range.is_none_or(|(low, high)| low < **read && **read < high)
+        !sensor.channel.disabled
+            && sensor.channel.range.is_none_or(|(low, high)| low < **read && **read < high)
     };
     let gauge = |((sensor, _), strain): ((&Sensor, &f64), f64)| Gauge {
         at_m: sensor.position.x_m,
@@ -584,7 +585,7 @@ struct Likelihood<'a> {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Guess {
+struct PointContact {
     position_m: f64,
     force_n: f64,
 }
@@ -600,8 +601,8 @@ impl Likelihood<'_> {
     }
 
     /// |r|², Jᵀr and JᵀJ of the whitened residual r.
-    fn fit_at(&self, guess: Guess, stretch: Stretch) -> ContactFit<2> {
-        let Guess { position_m, force_n } = guess;
+    fn fit_at(&self, guess: PointContact, stretch: Stretch) -> ContactFit<2> {
+        let PointContact { position_m, force_n } = guess;
         let bent = match self.theory {
             DigitTheory::Exact => {
                 Some(self.digit.shape(Contact { position: Position::along(position_m), force_n }))
@@ -652,7 +653,7 @@ fn force_step(fit: &ContactFit<2>) -> [f64; 2] {
     [0.0, if ff > 0.0 { fit.score[1] / ff } else { 0.0 }]
 }
 
-type Tried = (Guess, ContactFit<2>);
+type Tried = (PointContact, ContactFit<2>);
 
 const START_SHARES: [f64; 3] = [0.1, 0.4, 0.8];
 /// Strong bending shortens the lever arms.
@@ -671,18 +672,21 @@ fn search(likelihood: &Likelihood, stretch: Stretch) -> Tried {
     rest.into_iter().fold(first, |best, next| if next.1.misfit < best.1.misfit { next } else { best })
 }
 
-fn start(likelihood: &Likelihood, stretch: Stretch, position_m: f64) -> Guess {
+fn start(likelihood: &Likelihood, stretch: Stretch, position_m: f64) -> PointContact {
     let linear_n = likelihood.linear_force_n(position_m, stretch);
-    let guess = |factor: f64| clamped(likelihood, Guess { position_m, force_n: factor * linear_n }, stretch);
-    let chi_squared = |guess: Guess| likelihood.fit_at(guess, stretch).misfit;
-    let better = |best: Guess, next: Guess| if chi_squared(next) < chi_squared(best) { next } else { best };
+    let guess =
+        |factor: f64| clamped(likelihood, PointContact { position_m, force_n: factor * linear_n }, stretch);
+    let chi_squared = |guess: PointContact| likelihood.fit_at(guess, stretch).misfit;
+    let better = |best: PointContact, next: PointContact| {
+        if chi_squared(next) < chi_squared(best) { next } else { best }
+    };
     START_FORCES.iter().map(|factor| guess(*factor)).fold(guess(1.0), better)
 }
 
 fn refine(
     likelihood: &Likelihood,
     stretch: Stretch,
-    start: Guess,
+    start: PointContact,
     step: impl Fn(&Tried) -> [f64; 2],
 ) -> Tried {
     let mut best = (start, likelihood.fit_at(start, stretch));
@@ -720,7 +724,7 @@ fn descend(
     let mut share = 1.0;
     for _ in 0..MOST_HALVINGS {
         let (position_m, force_n) = (guess.position_m + share * along_m, guess.force_n + share * harder_n);
-        let next = clamped(likelihood, Guess { position_m, force_n }, stretch);
+        let next = clamped(likelihood, PointContact { position_m, force_n }, stretch);
         let there = likelihood.fit_at(next, stretch);
         if there.misfit < fit.misfit {
             return Some((next, there));
@@ -730,13 +734,13 @@ fn descend(
     None
 }
 
-fn clamped(likelihood: &Likelihood, guess: Guess, stretch: Stretch) -> Guess {
+fn clamped(likelihood: &Likelihood, guess: PointContact, stretch: Stretch) -> PointContact {
     let position_m = guess.position_m.max(stretch.from_m).min(stretch.to_m);
     let force_n = likelihood.force_n.unwrap_or_else(|| {
         let most_n = likelihood.most_force_n(position_m);
         guess.force_n.max(1e-9 * most_n).min(most_n)
     });
-    Guess { position_m, force_n }
+    PointContact { position_m, force_n }
 }
 
 /// Centre line from clamp to tip.

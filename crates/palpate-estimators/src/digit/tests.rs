@@ -157,7 +157,7 @@ proptest! {
 }
 
 #[test]
-fn what_one_gauge_sees_alone_is_ambiguous_unless_the_force_is_known() {
+fn contact_at_one_gauge_is_ambiguous_for_an_unknown_force() {
     let setup = example();
     let reading = clean(&setup, 0.014, 2.0);
     let estimate = locator(&setup, DigitTheory::Exact).locate(&reading).unwrap();
@@ -174,7 +174,7 @@ fn what_one_gauge_sees_alone_is_ambiguous_unless_the_force_is_known() {
 }
 
 #[test]
-fn readings_that_no_push_explains_say_so() {
+fn unexplained_readings_are_outside_model() {
     let setup = example();
     let locator = locator(&setup, DigitTheory::Exact);
     let status = |reading: &[f64]| locator.locate(reading).unwrap().status;
@@ -190,7 +190,7 @@ fn readings_that_no_push_explains_say_so() {
 }
 
 #[test]
-fn dead_and_saturated_gauges_are_left_out() {
+fn disabled_and_saturated_gauges_are_excluded() {
     let mut setup = example();
     setup
         .edit_sensors(|sensors| {
@@ -274,7 +274,7 @@ fn a_locator_survives_its_file_and_bad_numbers_do_not() {
         refused(|digit| {
             digit
                 .layout
-                .edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.dead = true))
+                .edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.disabled = true))
                 .unwrap();
         }),
     ];
@@ -318,7 +318,7 @@ fn for_small_forces_influence_functions_are_at_the_limit() {
     let limit = rig.setup.cramer_rao_bound().unwrap();
     let positions: Vec<Position> =
         (0..200).map(|i| Position::along(0.03 + 0.09 * f64::from(i) / 200.0)).collect();
-    let judged = simulate_at(&rig.pressed_setup(), &positions, 1, 9).unwrap();
+    let judged = simulate_at(&rig.training_setup(), &positions, 1, 9).unwrap();
     let (mut error_m, mut bound_m) = (0.0, 0.0);
     for row in &judged.rows {
         error_m += locator.locate(&row.reading).unwrap().contact.position.distance_m(row.position);

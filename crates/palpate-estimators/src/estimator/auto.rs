@@ -2,7 +2,8 @@
 
 use super::trial_splits::TrialSplits;
 use super::{Estimator, FitError, Locator, contenders};
-use crate::evaluation::{Evaluation, Located, Split};
+use crate::candidate_errors::CandidateErrors;
+use crate::evaluation::{EvaluatedContact, Evaluation, Split};
 use crate::fit::{FitTask, fit_with_interval_check};
 use crate::fit_memo::FitMemo;
 use crate::influence::{Influence, InfluenceFitError, Structure, is_one_weight, is_unsaturated};
@@ -10,7 +11,6 @@ use crate::offset_course::OffsetCourse;
 use crate::reading_check::ReadingCheck;
 use crate::recording::Recording;
 use crate::setup::Setup;
-use crate::tried::Tried;
 use palpate_mechanics::contact::Position;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{FEWEST_FOR_95, NORMAL_95, mean, mean_and_variance};
@@ -100,11 +100,11 @@ impl Estimator {
     /// [`FitError`] for an unsuitable recording or a cancellation.
     pub fn fit_decided(&self, task: FitTask, choice: Option<&Choice>) -> Result<Locator, FitError> {
         let mut locator = fit_with_interval_check(choice.map_or(self, |choice| &choice.best), task)?;
-        locator.provenance.choice = choice.map_or_else(Vec::new, |choice| choice.tried.clone());
+        locator.provenance.choice = choice.map_or_else(Vec::new, |choice| choice.candidates.clone());
         Ok(locator)
     }
 
-    pub(super) fn decided(&self, task: FitTask) -> Result<Self, FitError> {
+    pub(super) fn choose_estimator(&self, task: FitTask) -> Result<Self, FitError> {
         Ok(self.decide(task, None)?.map_or_else(|| self.clone(), |choice| choice.best))
     }
 
@@ -114,26 +114,26 @@ impl Estimator {
     /// # Errors
     /// As for [`Estimator::decide`].
     pub fn for_folds(&self, task: FitTask) -> Result<Self, FitError> {
-        if let Self::Auto(_) = self { Ok(self.clone()) } else { self.decided(task) }
+        if let Self::Auto(_) = self { Ok(self.clone()) } else { self.choose_estimator(task) }
     }
 }
 
 /// Chosen estimator and the scores of all candidates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
-    /// Least [`Tried::score_m`], or the simplest structure that is not significantly worse.
+    /// Least [`CandidateErrors::score_m`], or the simplest structure that is not significantly worse.
     pub best: Estimator,
     /// Candidates, the chosen one first, by rising score.
-    pub tried: Vec<Tried>,
+    pub candidates: Vec<CandidateErrors>,
     /// Omitted candidates with reasons.
-    pub left_out: Vec<(&'static str, String)>,
+    pub omitted: Vec<(&'static str, String)>,
     /// Largest subtracted drift of each channel.
     pub drift: Option<Vec<f64>>,
 }
 
 struct Trial {
     estimator: Estimator,
-    tried: Tried,
+    errors: CandidateErrors,
     evaluation: Evaluation,
 }
 
@@ -151,8 +151,8 @@ impl Trial {
     /// True where another score is less by more than two standard errors. Costs are half the sum of error and
     /// interval score, relative to the other trial's means.
     fn is_significantly_worse_than(&self, best: &Self) -> bool {
-        let [error_m, score_m] = [best.tried.mean_error_m, best.tried.interval_score_m];
-        let cost = |one: &Located| {
+        let [error_m, score_m] = [best.errors.mean_error_m, best.errors.interval_score_m];
+        let cost = |one: &EvaluatedContact| {
             0.5 * (one.error_m() / error_m + one.interval_score_m.map_or(1.0, |score| score / score_m))
         };
         let pairs = self.evaluation.located.iter().zip(&best.evaluation.located);
@@ -178,8 +178,8 @@ fn chosen(trials: &[Trial]) -> usize {
     simpler.min_by_key(|i| trials[*i].structure_rank()).unwrap_or(0)
 }
 
-fn figures(name: &str, evaluation: &Evaluation) -> Option<Tried> {
-    Some(Tried {
+fn figures(name: &str, evaluation: &Evaluation) -> Option<CandidateErrors> {
+    Some(CandidateErrors {
         name: name.to_owned(),
         mean_error_m: evaluation.summary(None)?.average_m,
         interval_score_m: evaluation.interval_score_m()?,
@@ -210,21 +210,21 @@ const NOT_IN_TIME: &str = "it was not done in time";
 ///
 /// # Errors
 /// [`InfluenceFitError`] for a failed fit or a cancellation.
-pub fn take_off_drift(
+pub fn subtract_drift(
     setup: &Setup,
     splits: &mut [Split],
     watch: Watch,
 ) -> Result<Option<Vec<f64>>, InfluenceFitError> {
-    subtract_drift(splits, watch, &FitMemo::new(setup))
+    subtract_drift_with(splits, watch, &FitMemo::new(setup))
 }
 
-fn subtract_drift(
+fn subtract_drift_with(
     splits: &mut [Split],
     watch: Watch,
     memo: &FitMemo,
 ) -> Result<Option<Vec<f64>>, InfluenceFitError> {
     let mut spans: Option<Vec<f64>> = None;
-    for Split { training, judged, offsets, .. } in splits {
+    for Split { training, held_out: judged, offsets, .. } in splits {
         let task = FitTask::new(memo.setup(), training).watch(watch).memo(memo);
         *offsets = Influence::default().offset_course(task, judged)?;
         for found in offsets.iter().map(OffsetCourse::spans) {
@@ -277,7 +277,7 @@ fn choose(
     let whole = FitTask::new(setup, &recording).watch(limited).memo(memo);
     let course = Influence::default().offset_course(whole, &recording);
     let drift = match course
-        .and_then(|course| course.map(|_| subtract_drift(&mut splits, limited, memo)).transpose())
+        .and_then(|course| course.map(|_| subtract_drift_with(&mut splits, limited, memo)).transpose())
     {
         Ok(drift) => drift.flatten(),
         Err(error) if Cancelled::caused(&error) => return Err(stopped(None)),
@@ -304,7 +304,7 @@ fn choose(
         match trials.evaluate(&estimator, limited) {
             Ok(one) => {
                 if let Some(figures) = figures(name, &one.evaluation) {
-                    tried.push(Trial { estimator, tried: figures, evaluation: one.evaluation });
+                    tried.push(Trial { estimator, errors: figures, evaluation: one.evaluation });
                 }
             }
             Err(error) if Cancelled::caused(&error) => {
@@ -320,14 +320,19 @@ fn choose(
             }
         }
     }
-    tried.sort_by(|a, b| a.tried.score_m().total_cmp(&b.tried.score_m()));
+    tried.sort_by(|a, b| a.errors.score_m().total_cmp(&b.errors.score_m()));
     if tried.is_empty() {
         return Err(last.map_or_else(|| Cancelled.into(), unsuited));
     }
     let first = tried.remove(chosen(&tried));
     let best = first.estimator.clone();
     tried.insert(0, first);
-    Ok(Choice { best, tried: tried.into_iter().map(|trial| trial.tried).collect(), left_out, drift })
+    Ok(Choice {
+        best,
+        candidates: tried.into_iter().map(|trial| trial.errors).collect(),
+        omitted: left_out,
+        drift,
+    })
 }
 
 #[cfg(test)]

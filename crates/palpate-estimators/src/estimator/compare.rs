@@ -12,7 +12,7 @@ pub struct Comparison {
     /// Estimator.
     pub estimator: Estimator,
     /// Evaluation and computing times.
-    pub tried: TimedEvaluation,
+    pub timed: TimedEvaluation,
 }
 
 /// Options of a comparison.
@@ -30,11 +30,11 @@ pub struct CompareOptions<'a> {
 
 /// Result of a comparison.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Compared {
+pub struct ComparisonResult {
     /// Evaluations by rising mean error.
     pub comparisons: Vec<Comparison>,
     /// Omitted estimators with reasons.
-    pub left_out: Vec<(&'static str, String)>,
+    pub omitted: Vec<(&'static str, String)>,
 }
 
 /// Fits and evaluates each suitable estimator on every split.
@@ -63,8 +63,8 @@ pub fn compare(
     contenders: Vec<Estimator>,
     trials: &[Split],
     options: CompareOptions,
-) -> Result<Compared, Cancelled> {
-    let mut compared = Compared::default();
+) -> Result<ComparisonResult, Cancelled> {
+    let mut compared = ComparisonResult::default();
     let of = contenders.len();
     let splits = TrialSplits::new(setup, trials, options.seed, options.clock);
     for (done, estimator) in contenders.into_iter().enumerate() {
@@ -73,18 +73,18 @@ pub fn compare(
         observe()?;
         let cost = trials.first().map(|trial| estimator.fit_cost(setup, &trial.training));
         if let Some(why) = cost.and_then(|cost| (options.refuse)(&estimator, cost)) {
-            compared.left_out.push((name, why));
+            compared.omitted.push((name, why));
             continue;
         }
         let go_on = |_| observe().is_ok();
         match splits.evaluate(&estimator, Watch::new(&go_on)) {
-            Ok(tried) => compared.comparisons.push(Comparison { estimator, tried }),
+            Ok(tried) => compared.comparisons.push(Comparison { estimator, timed: tried }),
             Err(error) if Cancelled::caused(&error) => return Err(Cancelled),
-            Err(error) => compared.left_out.push((name, error.to_string())),
+            Err(error) => compared.omitted.push((name, error.to_string())),
         }
     }
     let mean_m = |comparison: &Comparison| {
-        comparison.tried.evaluation.summary(None).map_or(f64::INFINITY, |summary| summary.average_m)
+        comparison.timed.evaluation.summary(None).map_or(f64::INFINITY, |summary| summary.average_m)
     };
     compared.comparisons.sort_by(|a, b| mean_m(a).total_cmp(&mean_m(b)));
     Ok(compared)

@@ -9,17 +9,18 @@ mod memory;
 mod settings;
 mod trial_splits;
 
+pub use crate::candidate_errors::CandidateErrors;
 pub use crate::fit::{LocatorProvenance, ReadingError};
 pub use crate::load_profile::{
     Cells, CentreOfPressure, ForceBounds, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit,
     Profiler, Resolution, patch_limits,
 };
 pub use crate::tracking::{
-    Across, Creep, Drift, SmoothTracker, Swing, Track, TrackError, Tracked, Tracker, TrackerConfig,
+    Creep, Drift, SmoothTracker, Swing, Track, TrackError, TrackedContact, Tracker, TrackerConfig,
+    TransverseMotion,
 };
-pub use crate::tried::Tried;
-pub use auto::{Auto, CHOICE_FOLDS, Choice, TimeLimit, take_off_drift};
-pub use compare::{CompareOptions, Compared, Comparison, compare};
+pub use auto::{Auto, CHOICE_FOLDS, Choice, TimeLimit, subtract_drift};
+pub use compare::{CompareOptions, Comparison, ComparisonResult, compare};
 pub use contenders::{UnknownEstimator, contenders, select};
 pub use cost::FitCost;
 pub use locator_file::{FORMAT_VERSION, LocatorFileError};
@@ -32,6 +33,7 @@ use std::sync::Arc;
 
 use crate::centroid::{Centroid, CentroidFitError, CentroidLocator};
 use crate::closed_form::{ClosedForm, ClosedFormFitError, ClosedFormLocator};
+use crate::detectable_force::DetectableForce;
 use crate::digit::{DigitEstimator, DigitFitError, DigitLocator, DigitShape, DigitTheory};
 use crate::evaluation::EvaluationError;
 use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, NoCheck, SeedQueue};
@@ -41,7 +43,6 @@ use crate::influence::{
     BeamLikelihood, ForceLinearLocator, Influence, InfluenceFitError, InfluenceLocator, InfluencesAtNodes,
     PlateLikelihood, Structure,
 };
-use crate::lightest_touch::LightestTouch;
 use crate::likelihood::{Likelihood, UntouchedSurface};
 use crate::load_profile::LoadChannel;
 use crate::neighbours::{Neighbours, NeighboursFitError, NeighboursLocator};
@@ -128,7 +129,7 @@ macro_rules! estimators {
                 let task = FitTask { recording: &learnt_from, ..task };
                 match self {
                     $(Self::$variant(estimator) => Ok(estimator.fit_method(task)?.into()),)*
-                    Self::Auto(_) => self.decided(asked)?.fit_method(asked),
+                    Self::Auto(_) => self.choose_estimator(asked)?.fit_method(asked),
                 }
             }
 
@@ -147,9 +148,9 @@ macro_rules! estimators {
 
             fn fit_without_interval_check(&self, task: FitTask) -> Result<Locator, FitError> {
                 if let Self::Auto(_) = self {
-                    return self.decided(task)?.fit_without_interval_check(task);
+                    return self.choose_estimator(task)?.fit_without_interval_check(task);
                 }
-                self.fit_beside(task, || ReadingCheck::fit(task))
+                self.fit_with_check(task, || ReadingCheck::fit(task))
             }
 
             fn fit_many(&self, task: FitTask, queue: &mut dyn SeedQueue<Locator>) -> Result<(), FitError> {
@@ -161,7 +162,7 @@ macro_rules! estimators {
                         let map = |_, locator: Fitted<$method>| locator.into_locator();
                         Ok(estimator.fit_many(task, &mut Mapped { queue, map })?)
                     })*
-                    Self::Auto(_) => self.decided(asked)?.fit_many(asked, queue),
+                    Self::Auto(_) => self.choose_estimator(asked)?.fit_many(asked, queue),
                 }
             }
         }
@@ -214,7 +215,7 @@ pub(crate) fn is_learnt(kind: &str) -> bool {
 }
 
 impl Estimator {
-    fn fit_beside(
+    fn fit_with_check(
         &self,
         task: FitTask,
         check: impl FnOnce() -> Result<Option<ReadingCheck>, Cancelled>,
@@ -222,7 +223,7 @@ impl Estimator {
         task.check_channels()?;
         let method = self.fit_method(task)?;
         let mut check = if is_learnt(self.kind()) { check()? } else { None };
-        if method.knows_its_errors()
+        if method.has_error_model()
             && let Some(by) = check
         {
             check = Some(by.keeping_intervals(task, |reading| method.locate(reading))?);
@@ -233,7 +234,7 @@ impl Estimator {
 }
 
 impl Method {
-    fn knows_its_errors(&self) -> bool {
+    fn has_error_model(&self) -> bool {
         matches!(self, Self::GaussianProcess(locator) if locator.widths.is_some())
     }
 }
@@ -288,7 +289,7 @@ impl Estimator {
     }
 
     /// Returns the default: [quick](Auto::quick) without a model, else the network.
-    pub fn usual(setup: &Setup) -> Self {
+    pub fn default_for(setup: &Setup) -> Self {
         match setup.surface().model() {
             Some(_) => Self::default(),
             None => Self::Auto(Auto::quick()),
@@ -447,7 +448,7 @@ impl Locator {
             }
             _ => return Err(LeaveOutError::Needed { kind }),
         }
-        self.setup.set_dead(channel, true);
+        self.setup.set_disabled(channel, true);
         if let Some(scatter) = &mut self.untouched_scatter {
             scatter.disable(channel);
         }
@@ -509,16 +510,15 @@ impl Locator {
             (Zero::Last, _) => tare.and_then(|tare| {
                 tare.with_last_zero().with_drift(vec![0.0; channels], vec![f64::INFINITY; channels])
             }),
-            (Zero::None, Some(drift)) => {
-                tare.and_then(|tare| tare.with_drift(drift.last.clone(), drift.reach(self.layout())))
-            }
+            (Zero::None, Some(drift)) => tare
+                .and_then(|tare| tare.with_drift(drift.last.clone(), drift.largest_changes(self.layout()))),
             (Zero::None, None) => tare,
         };
         // Channels and values of a locator are valid.
         tare.map_err(|_| NoBaseline { kind: self.kind() })
     }
 
-    /// Locates a reading by a following tare (see [`Tare::follow`]), with the result in `tared`.
+    /// Locates a reading by a following tare (see [`Tare::locate_and_update`]), with the result in `tared`.
     ///
     /// # Errors
     /// [`TareError`] for an invalid reading.
@@ -529,14 +529,16 @@ impl Locator {
         tared: &mut [f64],
     ) -> Result<Estimate, TareError> {
         // The tare has checked the channels and values.
-        tare.follow(reading, tared, |tared| self.locate(tared).unwrap_or_else(|_| self.anywhere()))
+        tare.locate_and_update(reading, tared, |tared| {
+            self.locate(tared).unwrap_or_else(|_| self.whole_surface_estimate())
+        })
     }
 
     /// Adds the scatter of untouched rows to the smallest detectable force.
     #[must_use]
-    pub fn beyond_scatter<'a>(&self, touch: LightestTouch<'a>) -> LightestTouch<'a> {
+    pub fn add_scatter<'a>(&self, touch: DetectableForce<'a>) -> DetectableForce<'a> {
         match &self.untouched_scatter {
-            Some(scatter) => touch.beyond(scatter),
+            Some(scatter) => touch.with_scatter(scatter),
             None => touch,
         }
     }
@@ -557,16 +559,16 @@ impl Locator {
     /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
     /// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
     /// let presses = setup.simulate(&Training::even(10), 0)?;
-    /// assert!(Influence::default().fit(&setup, &presses)?.into_locator().tells_force());
-    /// assert!(!Network::default().fit(&setup, &presses)?.into_locator().tells_force());
+    /// assert!(Influence::default().fit(&setup, &presses)?.into_locator().estimates_force());
+    /// assert!(!Network::default().fit(&setup, &presses)?.into_locator().estimates_force());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn tells_force(&self) -> bool {
+    pub fn estimates_force(&self) -> bool {
         match &self.method {
             Method::Influence(influence) => influence.tells_force(),
             Method::ClosedForm(_) | Method::Digit(_) => true,
             Method::Network(_) => false,
-            Method::NetworkLm(networks) => networks.tells_force(),
+            Method::NetworkLm(networks) => networks.estimates_force(),
             Method::GaussianProcess(process) => process.force_n.is_some(),
             Method::Neighbours(neighbours) => neighbours.force_n.is_some(),
             Method::Centroid(centroid) => centroid.force_n.is_some(),
@@ -597,9 +599,9 @@ impl Locator {
         let mut setup = self.setup.clone();
         if let Some(linear) = self.force_linear() {
             setup.edit_sensors(|sensors| {
-                sensors.iter_mut().for_each(|sensor| sensor.channel.dead = true);
+                sensors.iter_mut().for_each(|sensor| sensor.channel.disabled = true);
                 for (channel, _, noise_sd) in linear.channels() {
-                    sensors[channel].channel.dead = false;
+                    sensors[channel].channel.disabled = false;
                     sensors[channel].channel.noise_sd = noise_sd;
                 }
             })?;
@@ -690,7 +692,7 @@ impl Locator {
         if config.swing.is_some() && !matches!(self.setup.surface(), SurfaceSpec::Beam(_)) {
             return Err(NotTrackable::Mode);
         }
-        let untouched = UntouchedSurface::beside_walk(
+        let untouched = UntouchedSurface::without_walk(
             self.untouched_scatter.clone(),
             self.untouched_drift.clone(),
             &self.noise_sd().unwrap_or_default(),

@@ -48,7 +48,7 @@ impl<'a> TrialSplits<'a> {
     fn fit(&self, estimator: &Estimator, split: usize, task: FitTask) -> Result<(Locator, f64), FitError> {
         let known = self.checks[split].get().filter(|_| is_learnt(estimator.kind()));
         let known_s = known.map_or(0.0, |known| known.seconds);
-        let locator = estimator.fit_beside(task, || match known {
+        let locator = estimator.fit_with_check(task, || match known {
             Some(known) => Ok(known.check.clone()),
             None => {
                 let start = (self.clock)();

@@ -36,12 +36,12 @@ use palpate_numerics::watch::Watch;
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
-    pressed: Setup,
+    training_setup: Setup,
     /// Setup with the force of the evaluated contacts.
     touched: Setup,
     /// Multiples of the force, in turn.
     force_shares: &'static [f64],
-    known: Setup,
+    known_setup: Setup,
     presses: Vec<Position>,
     placement_sd_m: Option<f64>,
     contacts: Vec<Position>,
@@ -49,7 +49,7 @@ pub struct Calibration {
 
 /// Locator of a simulated calibration, with its evaluation.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Calibrated<M: Locate> {
+pub struct CalibrationTrial<M: Locate> {
     /// Seed of the simulation and the fit.
     pub seed: u64,
     /// Locator.
@@ -78,7 +78,7 @@ pub fn simulate_use_all_over_watched(
         |(position, share): (&Position, &f64)| Contact { position: *position, force_n: share * force_n };
     let contacts: Vec<Contact> = positions.iter().zip(shares.iter().cycle()).map(with_share).collect();
     let touches = simulate_use_watched(setup, calibration, &contacts, seed, watch)?;
-    Ok(touches.zeroed(setup.recording_columns().zero)?)
+    Ok(touches.subtract_zero(setup.recording_columns().zero)?)
 }
 
 impl Calibration {
@@ -94,10 +94,10 @@ impl Calibration {
         let with = |force_n| setup.clone().with_force(force_n);
         let press_force_n = press_force_n.or(setup.force_n());
         Ok(Self {
-            pressed: with(press_force_n)?,
+            training_setup: with(press_force_n)?,
             touched: with(setup.force_n().or(press_force_n))?,
             force_shares: &[1.0],
-            known: setup.clone(),
+            known_setup: setup.clone(),
             presses: Vec::new(),
             placement_sd_m: None,
             contacts: all_over(setup.surface().extent()),
@@ -110,19 +110,19 @@ impl Calibration {
     /// [`SimulateError`] for invalid positions or force.
     pub fn from_training(setup: &Setup, training: &Training) -> Result<Self, SimulateError> {
         let positions = training.positions(setup.surface().extent())?;
-        let calibration = Self::new(setup, training.force_n)?.pressed_at(&positions, training.repeats);
+        let calibration = Self::new(setup, training.force_n)?.with_presses(&positions, training.repeats);
         Ok(Self { placement_sd_m: training.placement_sd_m, ..calibration })
     }
 
     /// Sets the positions and repeats of presses.
     #[must_use]
-    pub fn pressed_at(self, positions: &[Position], repeats: usize) -> Self {
+    pub fn with_presses(self, positions: &[Position], repeats: usize) -> Self {
         Self { presses: repeated(positions, repeats), ..self }
     }
 
     /// Sets the evaluated contacts and their readings.
     #[must_use]
-    pub fn judged_at(self, contacts: &[Position], readings: usize) -> Self {
+    pub fn with_contacts(self, contacts: &[Position], readings: usize) -> Self {
         Self { contacts: repeated(contacts, readings), ..self }
     }
 
@@ -130,14 +130,14 @@ impl Calibration {
     #[must_use]
     pub fn at_forces_of_use(self) -> Self {
         let force_shares =
-            if self.known.force_n().is_some() { self.force_shares } else { &Self::UNKNOWN_FORCES };
+            if self.known_setup.force_n().is_some() { self.force_shares } else { &Self::UNKNOWN_FORCES };
         Self { force_shares, ..self }
     }
 
     /// Makes the force unknown to the locator.
     #[must_use]
     pub fn unknown_force(self) -> Self {
-        Self { known: self.known.unknown_force(), ..self }
+        Self { known_setup: self.known_setup.unknown_force(), ..self }
     }
 
     /// Positions of presses, repeats included.
@@ -177,31 +177,31 @@ impl Calibration {
         if self.touched.imperfections().is_some() {
             return self.simulate_in_time(seed, watch);
         }
-        if self.pressed.recording_columns().zero == Zero::Last {
+        if self.training_setup.recording_columns().zero == Zero::Last {
             return Err(NoUntouchedRow.into());
         }
         let all: Vec<Contact> = presses.chain(self.contacts()?).collect();
         let rows: Vec<usize> = (0..all.len()).collect();
         let (pressed, touched) = rows.split_at(self.presses.len());
         let recording = simulate_contacts_watched(&self.touched, &all, 1, seed, watch)?;
-        let training = if self.pressed.force_n() == self.touched.force_n() {
+        let training = if self.training_setup.force_n() == self.touched.force_n() {
             recording.subset(pressed)
         } else {
-            simulate_at_watched(&self.pressed, &self.presses, 1, seed, watch)?
+            simulate_at_watched(&self.training_setup, &self.presses, 1, seed, watch)?
         };
         let judged = recording.subset(touched);
-        Ok(Split { training, judged, offsets: None, origin: SplitOrigin::Calibration })
+        Ok(Split { training, held_out: judged, offsets: None, origin: SplitOrigin::Calibration })
     }
 
     fn simulate_in_time(&self, seed: u64, watch: Watch) -> Result<Split, SimulateError> {
-        let presses = Press::from_rows(&contacts_at(&self.pressed, &self.presses)?);
-        let mut bench = PressedBench::new(&self.pressed, &presses, seed, watch)?;
-        let zero = self.pressed.recording_columns().zero;
-        let training = bench.record(&presses, self.placement_sd_m, watch)?.zeroed(zero)?;
+        let presses = Press::from_rows(&contacts_at(&self.training_setup, &self.presses)?);
+        let mut bench = PressedBench::new(&self.training_setup, &presses, seed, watch)?;
+        let zero = self.training_setup.recording_columns().zero;
+        let training = bench.record(&presses, self.placement_sd_m, watch)?.subtract_zero(zero)?;
         bench.pause();
-        let judged = bench.record(&Press::from_rows(&self.contacts()?), None, watch)?.zeroed(zero)?;
+        let judged = bench.record(&Press::from_rows(&self.contacts()?), None, watch)?.subtract_zero(zero)?;
         let judged = judged.touched().into_owned();
-        Ok(Split { training, judged, offsets: None, origin: SplitOrigin::Calibration })
+        Ok(Split { training, held_out: judged, offsets: None, origin: SplitOrigin::Calibration })
     }
 
     /// Simulates `count` consecutive seeds.
@@ -229,8 +229,8 @@ impl Calibration {
         estimator: &E,
         seed: u64,
         watch: Watch,
-    ) -> Result<Calibrated<E::Method>, EvaluationError<E::Error>> {
-        self.run_with(seed, watch, |task| estimator.fit_alone(task))
+    ) -> Result<CalibrationTrial<E::Method>, EvaluationError<E::Error>> {
+        self.run_with(seed, watch, |task| estimator.fit_unchecked(task))
     }
 
     /// Simulates, fits by `fit` and evaluates.
@@ -242,11 +242,11 @@ impl Calibration {
         seed: u64,
         watch: Watch,
         fit: impl FnOnce(FitTask) -> Result<Fitted<M>, E>,
-    ) -> Result<Calibrated<M>, EvaluationError<E>> {
-        let Split { training, judged, .. } = self.simulate_watched(seed, watch)?;
-        let task = FitTask::new(&self.known, &training).seed(seed).watch(watch);
+    ) -> Result<CalibrationTrial<M>, EvaluationError<E>> {
+        let Split { training, held_out: judged, .. } = self.simulate_watched(seed, watch)?;
+        let task = FitTask::new(&self.known_setup, &training).seed(seed).watch(watch);
         let locator = fit(task).map_err(EvaluationError::Fit)?;
-        Ok(Calibrated { seed, evaluation: Evaluation::new(&locator, &judged)?, locator })
+        Ok(CalibrationTrial { seed, evaluation: Evaluation::new(&locator, &judged)?, locator })
     }
 
     /// Runs rising seeds; without faults the estimator fits equal presses together.
@@ -258,25 +258,25 @@ impl Calibration {
         estimator: &E,
         seeds: impl IntoIterator<Item = u64>,
         watch: Watch,
-    ) -> Result<Vec<Calibrated<E::Method>>, EvaluationError<E::Error>> {
+    ) -> Result<Vec<CalibrationTrial<E::Method>>, EvaluationError<E::Error>> {
         let seeds: Vec<u64> = seeds.into_iter().collect();
         let (Some(&seed), true) = (seeds.first(), self.is_faultless()) else {
             return seeds.into_iter().map(|seed| self.run(estimator, seed, watch)).collect();
         };
-        let Split { training, judged, .. } = self.simulate_watched(seed, watch)?;
+        let Split { training, held_out: judged, .. } = self.simulate_watched(seed, watch)?;
         let mut queue = SeedList::new(seeds);
-        let task = FitTask::new(&self.known, &training).seed(seed).watch(watch);
+        let task = FitTask::new(&self.known_setup, &training).seed(seed).watch(watch);
         estimator.fit_many(task, &mut queue).map_err(EvaluationError::Fit)?;
         let judge = |(seed, locator)| {
-            Ok(Calibrated { seed, evaluation: Evaluation::new(&locator, &judged)?, locator })
+            Ok(CalibrationTrial { seed, evaluation: Evaluation::new(&locator, &judged)?, locator })
         };
         queue.into_results().into_iter().map(judge).collect()
     }
 
     fn is_faultless(&self) -> bool {
-        let channels = self.pressed.layout().sensors();
+        let channels = self.training_setup.layout().sensors();
         let are_perfect = channels.iter().all(|sensor| sensor.channel == ChannelModel::default());
-        are_perfect && self.pressed.imperfections().is_none()
+        are_perfect && self.training_setup.imperfections().is_none()
     }
 }
 

@@ -4,7 +4,7 @@ mod calibration;
 mod mapped_positions;
 
 pub use crate::split::{Split, SplitOrigin};
-pub use calibration::{Calibrated, Calibration, simulate_use_all_over_watched};
+pub use calibration::{Calibration, CalibrationTrial, simulate_use_all_over_watched};
 pub use mapped_positions::{MappedPositions, SurfaceMap};
 pub use palpate_numerics::{median, percentile};
 
@@ -26,7 +26,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// True and estimated contact of one reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Located {
+pub struct EvaluatedContact {
     /// True position.
     pub truth: Position,
     /// True force, where known.
@@ -69,7 +69,7 @@ pub struct ForceSummary {
     pub coverage_percent: f64,
 }
 
-impl Located {
+impl EvaluatedContact {
     fn new(row: &Row, estimate: &Estimate, extent: Extent) -> Self {
         Self::of_contact(row.position, row.force_n, estimate, extent)
     }
@@ -103,7 +103,7 @@ pub struct Evaluation {
     /// Surface; percentage errors refer to its length.
     pub extent: Extent,
     /// Estimates in the order of the recording.
-    pub located: Vec<Located>,
+    pub located: Vec<EvaluatedContact>,
 }
 
 /// Closed portion of the length.
@@ -185,7 +185,7 @@ impl Evaluation {
     pub fn new<M: Locate>(locator: &Fitted<M>, recording: &Recording) -> Result<Self, ReadingError> {
         let extent = locator.setup.surface().extent();
         let rows = recording.rows.iter().filter(|row| row.touches());
-        let located = rows.map(|row| Ok(Located::new(row, &locator.locate(&row.reading)?, extent)));
+        let located = rows.map(|row| Ok(EvaluatedContact::new(row, &locator.locate(&row.reading)?, extent)));
         Ok(Self { extent, located: located.collect::<Result<_, _>>()? })
     }
 
@@ -213,7 +213,7 @@ impl Evaluation {
         let located = Mutex::new(Vec::with_capacity(rows.len()));
         let take = |first: usize, estimates: &[Estimate]| {
             let judged = rows[first..].iter().zip(estimates);
-            let judged = judged.map(|(row, estimate)| Located::new(row, estimate, extent));
+            let judged = judged.map(|(row, estimate)| EvaluatedContact::new(row, estimate, extent));
             located.lock().unwrap_or_else(PoisonError::into_inner).extend(judged);
         };
         locator.locate_blocks(&readings, BatchOptions { watch, ..BatchOptions::default() }, &take)?;
@@ -222,7 +222,8 @@ impl Evaluation {
 
     /// Returns the errors in a portion, or everywhere.
     pub fn summary(&self, portion: Option<Portion>) -> Option<ErrorSummary> {
-        let inside = |located: &&Located| portion.is_none_or(|portion| portion.contains(located.truth));
+        let inside =
+            |located: &&EvaluatedContact| portion.is_none_or(|portion| portion.contains(located.truth));
         let errors = sorted_errors_m(self.located.iter().filter(inside));
         Some(ErrorSummary {
             count: errors.len(),
@@ -298,14 +299,15 @@ impl Evaluation {
 
     /// Returns the median error by cell; NaN for an empty one.
     pub fn median_by_cell_m(&self, cells: &Cells) -> Vec<f64> {
-        let median = |cell: Vec<&Located>| percentile(&sorted_errors_m(cell), 50.0).unwrap_or(f64::NAN);
+        let median =
+            |cell: Vec<&EvaluatedContact>| percentile(&sorted_errors_m(cell), 50.0).unwrap_or(f64::NAN);
         self.by_cell(cells).into_iter().map(median).collect()
     }
 
     /// Returns mean position and median error in each of `count` equal sections with contacts.
     pub fn median_by_stretch_m(&self, count: usize) -> Vec<(f64, f64)> {
         let extent = self.extent.along_x();
-        let point = |stretch: Vec<&Located>| {
+        let point = |stretch: Vec<&EvaluatedContact>| {
             let mean_m = stretch.iter().map(|located| located.truth.x_m).sum::<f64>() / stretch.len() as f64;
             Some((mean_m, percentile(&sorted_errors_m(stretch), 50.0)?))
         };
@@ -313,7 +315,7 @@ impl Evaluation {
         stretches.into_iter().filter_map(point).collect()
     }
 
-    fn by_cell(&self, cells: &Cells) -> Vec<Vec<&Located>> {
+    fn by_cell(&self, cells: &Cells) -> Vec<Vec<&EvaluatedContact>> {
         let mut parts = vec![Vec::new(); cells.len()];
         for located in &self.located {
             parts[cells.cell_of(located.truth)].push(located);
@@ -332,13 +334,13 @@ impl Evaluation {
         let mut sorted = self.located.clone();
         sorted.sort_by(|a, b| a.truth.cmp_by_x_then_y(&b.truth));
         let groups = sorted.chunk_by(|a, b| a.truth == b.truth);
-        let part = |located: &[Located]| Self { extent: self.extent, located: located.to_vec() };
+        let part = |located: &[EvaluatedContact]| Self { extent: self.extent, located: located.to_vec() };
         groups.map(|group| (group[0].truth, part(group))).collect()
     }
 }
 
-fn sorted_errors_m<'a>(located: impl IntoIterator<Item = &'a Located>) -> Vec<f64> {
-    let mut errors: Vec<f64> = located.into_iter().map(Located::error_m).collect();
+fn sorted_errors_m<'a>(located: impl IntoIterator<Item = &'a EvaluatedContact>) -> Vec<f64> {
+    let mut errors: Vec<f64> = located.into_iter().map(EvaluatedContact::error_m).collect();
     errors.sort_by(f64::total_cmp);
     errors
 }
@@ -449,7 +451,7 @@ pub(crate) fn evaluate_held_out<M: Locate, E: std::error::Error>(
         widen_by_other_folds(&mut estimates, extent);
     }
     let located = estimates.iter().map(|HeldOutEstimate { truth, force_n, estimate, .. }| {
-        Located::of_contact(*truth, *force_n, estimate, extent)
+        EvaluatedContact::of_contact(*truth, *force_n, estimate, extent)
     });
     let evaluation = Evaluation { extent, located: located.collect() };
     let readings = evaluation.located.len().max(1) as f64;

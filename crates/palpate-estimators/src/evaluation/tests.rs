@@ -5,7 +5,7 @@ fn evaluation() -> Evaluation {
     let located = (1..=10).map(|k| {
         let truth = Position::along(f64::from(k) * 0.01 - 0.005);
         let estimate = Position::along(truth.x_m + f64::from(k) * 0.5e-3);
-        Located {
+        EvaluatedContact {
             truth,
             force_n: None,
             estimate,
@@ -23,7 +23,7 @@ fn close(value: f64, expected: f64) {
 }
 
 #[test]
-fn the_summary_is_what_a_hand_finds() {
+fn summary_equals_hand_computation() {
     let summary = evaluation().summary(None).unwrap();
     assert_eq!(summary.count, 10);
     close(summary.average_m, 2.75e-3);
@@ -44,7 +44,7 @@ fn portions_hold_their_ends() {
 }
 
 #[test]
-fn the_effective_length_counts_what_is_near_enough() {
+fn effective_length_counts_errors_within_tolerance() {
     close(evaluation().effective_percent(2.0e-3 + 1e-12), 40.0);
     close(evaluation().effective_percent(1e-4), 0.0);
     close(evaluation().effective_percent(1.0), 100.0);
@@ -89,7 +89,7 @@ fn a_spread_does_not_mind_the_order() {
 }
 
 #[test]
-fn intervals_score_by_their_width_and_forty_times_what_they_miss() {
+fn interval_score_is_width_plus_forty_times_the_miss() {
     close(score_of_interval((1e-3, 3e-3), 2e-3), 2e-3);
     close(score_of_interval((1e-3, 3e-3), 3.5e-3), 2e-3 + 40.0 * 0.5e-3);
     close(score_of_interval((1e-3, 3e-3), 0.0), 2e-3 + 40.0 * 1e-3);
@@ -129,7 +129,7 @@ fn positions_that_count_from_the_other_end_or_along_other_axes_are_recognised() 
         let located = places.map(|(x, y)| {
             let y_m = if extent.width_m().is_some() { 0.005 + 0.02 * f64::from(y) } else { 0.0 };
             let estimate = Position { x_m: 0.02 * f64::from(x) + 0.004 * f64::from(y) + 0.001, y_m };
-            Located { truth: recorded(estimate), estimate, ..evaluation().located[0] }
+            EvaluatedContact { truth: recorded(estimate), estimate, ..evaluation().located[0] }
         });
         let evaluation = Evaluation { extent, located: located.collect() };
         evaluation.mapped_positions().map(|found| (found.map, found.mapped_m < 1e-12))

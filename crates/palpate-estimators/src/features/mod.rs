@@ -83,7 +83,8 @@ pub struct Feature {
     /// Mean over the recording.
     pub centre: f64,
     /// Standard deviation over the recording; greater than 0.
-    pub spread: f64,
+    #[serde(rename = "spread")]
+    pub standard_deviation: f64,
 }
 
 /// Source of a feature.
@@ -136,8 +137,9 @@ impl Features {
     /// Returns the features of a reading.
     pub fn apply(&self, reading: &[f64]) -> Vec<f64> {
         let norm = self.norm(reading).max(self.least_norm);
-        let standardized =
-            |feature: &Feature| (self.raw(feature.source, reading, norm) - feature.centre) / feature.spread;
+        let standardized = |feature: &Feature| {
+            (self.raw(feature.source, reading, norm) - feature.centre) / feature.standard_deviation
+        };
         self.features.iter().map(standardized).collect()
     }
 
@@ -151,7 +153,7 @@ impl Features {
         };
         positive("least norm", &mut [self.least_norm].into_iter())?;
         positive("channel divisor", &mut self.channels.iter().map(|scale| scale.divisor))?;
-        positive("feature spread", &mut self.features.iter().map(|feature| feature.spread))?;
+        positive("feature spread", &mut self.features.iter().map(|feature| feature.standard_deviation))?;
         let centres = self.features.iter().map(|feature| feature.centre);
         LocatorFault::check_numbers("feature centre", centres, |_| true, "finite")?;
         let known = self.channels.iter().filter(|scale| scale.channel < channels).count();
@@ -186,7 +188,11 @@ impl Features {
         let (centre, variance) = mean_and_variance(values.iter().copied());
         let spread = variance.sqrt();
         let largest = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-        (spread > ROUNDING * largest && spread.is_finite()).then_some(Feature { source, centre, spread })
+        (spread > ROUNDING * largest && spread.is_finite()).then_some(Feature {
+            source,
+            centre,
+            standard_deviation: spread,
+        })
     }
 }
 

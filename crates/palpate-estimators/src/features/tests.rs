@@ -42,7 +42,7 @@ fn recording_of(rows: Vec<Row>) -> Recording {
 }
 
 #[test]
-fn features_are_standardized_and_dead_channels_left_out() {
+fn features_are_standardized_without_disabled_channels() {
     let recording = recording();
     for (kind, count) in [(FeatureKind::Readings, 3), (FeatureKind::LoadInvariant, 4)] {
         let features = Features::fit(kind, &recording).unwrap();
@@ -58,14 +58,17 @@ fn features_are_standardized_and_dead_channels_left_out() {
 }
 
 #[test]
-fn only_the_log_norm_knows_the_load() {
+fn only_the_log_norm_depends_on_the_load() {
     let features = Features::fit(FeatureKind::LoadInvariant, &recording()).unwrap();
     let (light, heavy) = (row(0.3, 1.0).reading, row(0.3, 2.5).reading);
     let (light, heavy) = (features.apply(&light), features.apply(&heavy));
     for (i, feature) in features.features.iter().enumerate() {
         let difference = heavy[i] - light[i];
-        let expected =
-            if feature.source == FeatureSource::LogNorm { 2.5_f64.ln() / feature.spread } else { 0.0 };
+        let expected = if feature.source == FeatureSource::LogNorm {
+            2.5_f64.ln() / feature.standard_deviation
+        } else {
+            0.0
+        };
         assert!((difference - expected).abs() < 1e-12, "{difference} {expected}");
     }
     assert!(features.apply(&[0.0; 4]).iter().all(|value| value.is_finite()));
@@ -92,7 +95,7 @@ fn a_damaged_file_is_refused() {
         |f| f.channels[1].channel = 4,
         |f| f.channels[0].divisor = 0.0,
         |f| f.features[0].source = FeatureSource::Channel(3),
-        |f| f.features[2].spread = f64::NAN,
+        |f| f.features[2].standard_deviation = f64::NAN,
         |f| f.features.clear(),
     ];
     for damage in damage {
@@ -104,7 +107,7 @@ fn a_damaged_file_is_refused() {
 
 /// Near both supports of a beam readings are almost 0; only proportions distinguish the ends.
 #[test]
-fn the_ends_of_a_beam_are_told_apart_where_the_force_is_known() {
+fn ends_of_a_beam_are_distinguished_for_a_known_force() {
     let Example { setup, training } = paper(5e-6, 5);
     let presses = setup.simulate(&Training { count: 20, ..training }, 0).unwrap();
     let positions: Vec<Position> = (2..=38).map(|cm| Position::along(f64::from(cm) * 0.01)).collect();

@@ -79,7 +79,7 @@ fn no_force_is_negative_or_greater_than_the_upper_end() {
 }
 
 #[test]
-fn a_likelihood_that_says_nothing_leaves_the_prior() {
+fn flat_likelihood_gives_the_prior() {
     let found = log_normal(0.5, 10.0).integrate(likelihood(0.0, 0.0));
     let [_, mean_n, variance_n2] = by_small_steps((0.5, 10.0), 0.0, 0.0);
     assert!((found.mean_n / mean_n - 1.0).abs() < 0.01, "{found:?} beside {mean_n}");

@@ -105,7 +105,7 @@ fn a_pad_is_two_dimensional() {
 }
 
 #[test]
-fn a_position_beyond_the_edge_is_said_to_be_one() {
+fn position_beyond_the_edge_is_reported() {
     // Presses up to the edge, and the reading of a press beyond it.
     let rows = (0..41).map(|i| {
         let x_m = 0.01 * f64::from(i);
@@ -124,7 +124,7 @@ fn a_position_beyond_the_edge_is_said_to_be_one() {
 }
 
 #[test]
-fn recordings_that_say_nothing_are_refused() {
+fn recordings_without_information_are_refused() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
     let setup = raw_setup(*EXTENT, 4, None);
     let one_place = raw_recording((0..9).map(|_| bells(0.1, 1.0, 0.01, &mut rng)).collect());

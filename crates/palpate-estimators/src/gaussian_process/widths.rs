@@ -61,7 +61,7 @@ impl Widths {
             watch.counted("holding positions out", "folds", k, count)?;
             let points = Points::new(&recording.subset(&fold.training), features, extent);
             let process = regression.condition(points.samples(), hyperparameters, watch)?;
-            held_out.judge(&process, recording, &fold.held_out, features, extent);
+            held_out.add_held_out(&process, recording, &fold.held_out, features, extent);
         }
         let searched = Regression { kernel: Kernel::Matern52, trend: Trend::Constant, seed, ..regression };
         held_out.widths(searched, watch)
@@ -105,7 +105,7 @@ pub(crate) fn folds_taken(rows: usize) -> usize {
 }
 
 impl HeldOut {
-    fn judge(
+    fn add_held_out(
         &mut self,
         process: &GaussianProcess,
         recording: &Recording,

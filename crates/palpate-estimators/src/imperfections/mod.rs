@@ -11,7 +11,7 @@ mod soft_layer;
 
 pub use channels::{BenchState, ChannelState, ImperfectChannels};
 pub(crate) use noise::StandardNoise;
-pub(crate) use soft_layer::spread_contact;
+pub(crate) use soft_layer::distribute_contact;
 
 use palpate_mechanics::contact::Extent;
 use palpate_numerics::OutOfRange;

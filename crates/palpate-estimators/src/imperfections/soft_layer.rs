@@ -7,7 +7,7 @@ use palpate_mechanics::surface::midpoints;
 const POINTS: usize = 8;
 
 /// Equal point contacts over the width, truncated at the edges.
-pub(crate) fn spread_contact(contact: Contact, width_m: f64, extent: Extent) -> Vec<Contact> {
+pub(crate) fn distribute_contact(contact: Contact, width_m: f64, extent: Extent) -> Vec<Contact> {
     if width_m <= 0.0 {
         return vec![contact];
     }

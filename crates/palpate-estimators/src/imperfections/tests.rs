@@ -120,7 +120,7 @@ fn noise_has_its_correlation_and_its_tails_at_a_variance_of_1() {
 fn a_soft_layer_spreads_the_force_over_its_width_and_stays_on_the_surface() {
     let line = Extent::line(0.1).unwrap();
     let contact = |x_m: f64, y_m: f64| Contact { position: Position { x_m, y_m }, force_n: 4.0 };
-    let middle = spread_contact(contact(0.05, 0.0), 0.01, line);
+    let middle = distribute_contact(contact(0.05, 0.0), 0.01, line);
     let force: f64 = middle.iter().map(|point| point.force_n).sum();
     let mean = middle.iter().map(|point| point.position.x_m).sum::<f64>() / middle.len() as f64;
     let variance =
@@ -129,10 +129,10 @@ fn a_soft_layer_spreads_the_force_over_its_width_and_stays_on_the_surface() {
     // w²/12 of a uniform pressure, less 1/64.
     assert!((variance / (1e-4 / 12.0) - 63.0 / 64.0).abs() < 1e-9, "{variance}");
     let plane = Extent::plane(0.1, 0.08).unwrap();
-    let corner = spread_contact(contact(0.1, 0.0), 0.01, plane);
+    let corner = distribute_contact(contact(0.1, 0.0), 0.01, plane);
     assert!(corner.len() == 64 && corner.iter().all(|point| plane.contains(point.position)));
     assert!((corner.iter().map(|point| point.force_n).sum::<f64>() - 4.0).abs() < 1e-12);
-    assert_eq!(spread_contact(contact(0.05, 0.0), 0.0, line), [contact(0.05, 0.0)]);
+    assert_eq!(distribute_contact(contact(0.05, 0.0), 0.0, line), [contact(0.05, 0.0)]);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Groups of eight channels for vector instructions.
 
-use palpate_numerics::simd::Eight;
+use palpate_numerics::simd::EightLanes;
 
 pub(super) const LANES: usize = 8;
 
@@ -14,7 +14,7 @@ pub(super) fn in_lanes(numbers: &[f64]) -> Vec<Lanes> {
 
 /// Sum over the channels, added in pairs for a short dependency chain.
 #[inline(always)]
-pub(super) fn sum_of<V: Eight<Real = f64>>(lanes: V) -> f64 {
+pub(super) fn sum_of<V: EightLanes<Real = f64>>(lanes: V) -> f64 {
     let [a, b, c, d, e, f, g, h] = lanes.to_array();
     ((a + e) + (b + f)) + ((c + g) + (d + h))
 }

@@ -70,7 +70,7 @@ pub(super) fn learn(
     let mut channels = Channels {
         offsets: untouched.map_or_else(|| vec![0.0; layout.len()], |untouched| untouched.mean),
         noise_sd: vec![1.0; layout.len()],
-        dead: layout.sensors().iter().map(|sensor| sensor.channel.dead).collect(),
+        dead: layout.sensors().iter().map(|sensor| sensor.channel.disabled).collect(),
         reference_force_n: mean_force_n(&rows),
         greatest_force_n: task.setup.greatest_force_n(),
         least_force_n: task.setup.force_range().map(|range| range.ends_n().0),
@@ -80,7 +80,7 @@ pub(super) fn learn(
     for kind in SensorKind::ALL {
         let is_meant = |s: &usize| {
             let sensor = &layout.sensors()[*s];
-            sensor.kind == kind && !sensor.channel.dead
+            sensor.kind == kind && !sensor.channel.disabled
         };
         let living: Vec<usize> = (0..layout.len()).filter(is_meant).collect();
         if living.is_empty() {
@@ -95,7 +95,7 @@ fn check_sensors(layout: &Layout) -> Result<(), InfluenceFitError> {
     if let Some(raw) = layout.sensors().iter().position(|sensor| sensor.kind == SensorKind::Raw) {
         return Err(InfluenceFitError::RawSensor { sensor: raw + 1 });
     }
-    if layout.sensors().iter().all(|sensor| sensor.channel.dead) {
+    if layout.sensors().iter().all(|sensor| sensor.channel.disabled) {
         return Err(InfluenceFitError::AllDead { sensors: layout.len() });
     }
     Ok(())

@@ -3,7 +3,7 @@
 
 use super::lanes::{LANES, Lanes, sum_of};
 use crate::force_prior::PriorTerms;
-use palpate_numerics::simd::{Eight, InstructionSet, Kernel, Simd, Vector};
+use palpate_numerics::simd::{EightLanes, InstructionSet, Kernel, Simd, Vector};
 use palpate_numerics::small::{Ldl, Matrix};
 use palpate_numerics::with_shared_error;
 
@@ -76,7 +76,7 @@ impl<I: Iterator<Item = (Lanes, Lanes, [Lanes; 3])>> Kernel for SumGroups<I> {
 
 pub(super) struct EquationSums<V>([V; 10]);
 
-impl<V: Eight<Real = f64>> EquationSums<V> {
+impl<V: EightLanes<Real = f64>> EquationSums<V> {
     #[inline(always)] // Compiled for the instructions of its caller.
     pub fn new() -> Self {
         Self([V::splat(0.0); 10])

@@ -27,9 +27,9 @@ pub use grid::Axis;
 pub use noise::Whitening;
 pub use plane::{PlaneLocator, PlaneScratch, PlaneTable, PlateLikelihood};
 
+use crate::detectable_force::DetectableForce;
 use crate::fit::{Fit, FitTask, Locate, LocatorFault, NoCheck};
 use crate::force_prior::ONE_WEIGHT;
-use crate::lightest_touch::LightestTouch;
 use crate::offset_course::OffsetCourse;
 use crate::recording::Recording;
 use crate::setup::Setup;
@@ -99,16 +99,16 @@ impl Fit for Influence {
 
 impl Influence {
     /// Returns the smallest detectable force at an unknown force, common to `closed-form` and `digit`.
-    pub fn lightest_touch<'a>(&self, limit: &'a CramerRaoBound<'a>) -> LightestTouch<'a> {
+    pub fn lightest_touch<'a>(&self, limit: &'a CramerRaoBound<'a>) -> DetectableForce<'a> {
         let extent = limit.extent();
         let unknowns = unknowns(extent.dimensions(), None);
         let places = match extent {
             Extent::Line { .. } => LINE_PLACES,
             Extent::Plane { .. } => PlaneTable::places(extent),
         };
-        let rule = StatusRule::new(limit.alive(), unknowns, places, self.false_alarm_rate);
-        let detection = rule.detection(limit.alive(), unknowns);
-        LightestTouch::new(
+        let rule = StatusRule::new(limit.enabled_count(), unknowns, places, self.false_alarm_rate);
+        let detection = rule.detection(limit.enabled_count(), unknowns);
+        DetectableForce::new(
             detection,
             self.false_alarm_rate,
             limit.noise_sds(),

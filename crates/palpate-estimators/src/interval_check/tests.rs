@@ -92,7 +92,7 @@ fn widened_intervals_hold_presses_of_further_places() {
 }
 
 #[test]
-fn eighteen_places_bound_nothing() {
+fn eighteen_places_give_no_bound() {
     assert_eq!(IntervalCheck::of_estimates(&estimates(18, 10, 2.0, 1), line()), None);
 }
 
@@ -111,7 +111,7 @@ fn places_that_are_not_found_complete_the_number_for_a_check() {
 }
 
 #[test]
-fn untouched_estimates_and_known_forces_are_left_out() {
+fn untouched_estimates_and_known_forces_are_excluded() {
     let mut held_out = estimates(30, 1, 1.0, 1);
     for one in &mut held_out {
         one.estimate.contact.uncertainty.as_mut().unwrap().covariance[5] = 0.0;
@@ -143,7 +143,7 @@ fn a_rig_whose_noise_is_half_the_truth_gives_wider_intervals() {
         .unwrap();
     let locator = Influence::default().fit(&setup(5.0), &split.training).unwrap();
     let check = locator.interval_check.unwrap();
-    let coverage = |locator| Evaluation::new(locator, &split.judged).unwrap().coverage_percent().unwrap();
+    let coverage = |locator| Evaluation::new(locator, &split.held_out).unwrap().coverage_percent().unwrap();
     let unchecked = crate::fit::Fitted { interval_check: None, ..locator.clone() };
     assert!(check.position.factor > 1.2, "{check:?}");
     assert!(coverage(&unchecked) < 90.0, "{}", coverage(&unchecked));
@@ -188,7 +188,7 @@ fn beside_their_places(places: usize, widest_m: f64, placement_sd_m: f64, seed: 
 }
 
 #[test]
-fn errors_that_intervals_do_not_know_add_a_standard_deviation() {
+fn unmodelled_errors_add_a_standard_deviation() {
     for extent in [line(), plane()] {
         let found = |seed| {
             let held_out = beside_their_places(40, 4e-3, 2e-3, seed);
@@ -219,7 +219,7 @@ fn intervals_that_are_narrower_in_use_than_at_held_out_places_contain_the_positi
 }
 
 #[test]
-fn intervals_that_know_their_errors_get_no_standard_deviation() {
+fn modelled_errors_add_no_standard_deviation() {
     let added = (0..40).filter(|seed| {
         let held_out = beside_their_places(40, 4e-3, 0.0, *seed);
         IntervalCheck::of_estimates(&held_out, plane()).unwrap().position.added_sd > 0.0

@@ -9,7 +9,7 @@
 //! misfit for its own sum, which increases with t.
 
 use ndarray::{Array1, Array2};
-use palpate_numerics::{Cholesky, holding};
+use palpate_numerics::{Cholesky, extend_to};
 
 /// Critical misfit increase. The unconstrained 3.84 (χ², 95 %) covers only 92 %, because x ≥ 0 increases the
 /// least misfit.
@@ -35,7 +35,7 @@ pub(super) struct Bounds {
 struct Least {
     load: Array1<f64>,
     sum: f64,
-    misfit: f64,
+    chi_squared: f64,
 }
 
 impl Bounds {
@@ -44,7 +44,7 @@ impl Bounds {
         let stiffness = gram.diag().sum() / gram.nrows().max(1) as f64;
         let best = LeastSquares { gram: &gram, right: &right, drawn: None }.non_negative();
         let square = y.dot(y);
-        let most = misfit((&gram, &right, square), &best) + RATIO_95;
+        let most = squared_residual((&gram, &right, square), &best) + RATIO_95;
         Self { gram, right, square, best, most, stiffness }
     }
 
@@ -67,7 +67,7 @@ impl Bounds {
     /// A mean v is accepted if the bounds of Σ (a − v)·x contain 0; the load at the upper bound gives the
     /// next v (Dinkelbach, *On Nonlinear Fractional Programming*, Management Science 13, 1967).
     pub fn of_mean(&self, cells: &[usize], coordinates: &[f64]) -> (f64, f64) {
-        let ends = coordinates.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |ends, a| holding(ends, *a));
+        let ends = coordinates.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |ends, a| extend_to(ends, *a));
         let mean = |load: &Array1<f64>| {
             let (mut moment, mut sum) = (0.0, 0.0);
             for (cell, a) in cells.iter().zip(coordinates) {
@@ -100,13 +100,13 @@ impl Bounds {
     fn bound(&self, c: &Array1<f64>, side: f64) -> Option<(f64, Array1<f64>)> {
         let best = c.dot(&self.best);
         let step = side * 0.01 * best.abs().max(1.0 / self.stiffness.sqrt());
-        let least = Least { load: self.best.clone(), sum: best, misfit: self.least_misfit() };
+        let least = Least { load: self.best.clone(), sum: best, chi_squared: self.least_misfit() };
         let (mut inside, mut way) = ((best, least), step);
         for _ in 0..MOST_DOUBLINGS {
             let t = best + way;
             let least = self.least(c, t);
-            if least.misfit > self.most {
-                return Some(self.between(c, inside, (t, least)));
+            if least.chi_squared > self.most {
+                return Some(self.critical_value_between(c, inside, (t, least)));
             }
             // No load has a sum below 0.
             if side < 0.0 && least.sum <= 0.0 && c.iter().all(|c| *c >= 0.0) {
@@ -119,36 +119,41 @@ impl Bounds {
     }
 
     /// As `bound`, between two targets t.
-    fn between(
+    fn critical_value_between(
         &self,
         c: &Array1<f64>,
         mut inside: (f64, Least),
         mut outside: (f64, Least),
     ) -> (f64, Array1<f64>) {
         for _ in 0..MOST_STEPS {
-            let over = outside.1.misfit - self.most;
-            if over < NEGLIGIBLE || self.most - inside.1.misfit < NEGLIGIBLE {
+            let over = outside.1.chi_squared - self.most;
+            if over < NEGLIGIBLE || self.most - inside.1.chi_squared < NEGLIGIBLE {
                 break;
             }
             let t = 0.5 * (inside.0 + outside.0);
             let least = self.least(c, t);
-            let end = if least.misfit > self.most { &mut outside } else { &mut inside };
+            let end = if least.chi_squared > self.most { &mut outside } else { &mut inside };
             *end = (t, least);
         }
         let (inside, outside) = (inside.1, outside.1);
-        let share = (self.most - inside.misfit) / (outside.misfit - inside.misfit).max(f64::MIN_POSITIVE);
+        let share = (self.most - inside.chi_squared)
+            / (outside.chi_squared - inside.chi_squared).max(f64::MIN_POSITIVE);
         (inside.sum + share * (outside.sum - inside.sum), inside.load)
     }
 
     fn least(&self, c: &Array1<f64>, t: f64) -> Least {
         let drawn = Some((c, self.stiffness, t));
         let x = LeastSquares { gram: &self.gram, right: &self.right, drawn }.non_negative();
-        Least { sum: c.dot(&x), misfit: misfit((&self.gram, &self.right, self.square), &x), load: x }
+        Least {
+            sum: c.dot(&x),
+            chi_squared: squared_residual((&self.gram, &self.right, self.square), &x),
+            load: x,
+        }
     }
 }
 
 /// ‖A·x − y‖² from AᵀA, Aᵀy and |y|².
-fn misfit((gram, right, square): (&Array2<f64>, &Array1<f64>, f64), x: &Array1<f64>) -> f64 {
+fn squared_residual((gram, right, square): (&Array2<f64>, &Array1<f64>, f64), x: &Array1<f64>) -> f64 {
     let used: Vec<usize> = (0..x.len()).filter(|i| x[*i] > 0.0).collect();
     let row = |i: &usize| x[*i] * used.iter().map(|j| gram[[*i, *j]] * x[*j]).sum::<f64>();
     used.iter().map(row).sum::<f64>() - 2.0 * x.dot(right) + square

@@ -27,7 +27,7 @@ pub(super) struct EvenMean {
 
 impl CumulativeInfluence {
     pub fn new(sensors: &LoadSensors, cells: &Cells) -> Self {
-        let alive: Vec<&LoadChannel> = sensors.alive().collect();
+        let alive: Vec<&LoadChannel> = sensors.enabled().collect();
         let channels = alive.len();
         let [along, across] = cells.points_a_side();
         let parts = [cells.columns * along, cells.rows * across];
@@ -171,7 +171,7 @@ mod tests {
         let summed = |[[left, right], [low, high]]: [[f64; 2]; 2]| -> Vec<f64> {
             let corner = |x_m, y_m| Position { x_m, y_m: if on_plane { y_m } else { 0.0 } };
             let load = UniformLoad::new(corner(left, low), corner(right, high), 1.0);
-            sensors.alive().map(|channel| load.mean(&*channel.influence) / channel.noise_sd).collect()
+            sensors.enabled().map(|channel| load.mean(&*channel.influence) / channel.noise_sd).collect()
         };
         let size = summed(ends_m).iter().fold(0.0, |size: f64, value| size.max(value.abs()));
         for (told, summed) in told.value.iter().zip(summed(ends_m)) {

@@ -47,12 +47,12 @@ pub(super) struct EvenLoads<'a> {
 #[derive(Clone)]
 struct Minimum {
     unknowns: Vec<f64>,
-    misfit: f64,
+    chi_squared: f64,
 }
 
 /// Value with an interval.
 #[derive(Clone, Copy)]
-pub(super) enum Aim {
+pub(super) enum LoadQuantity {
     /// Of a load, in newtons.
     Force(usize),
     /// In newtons.
@@ -64,7 +64,7 @@ pub(super) enum Aim {
 }
 
 /// Value, target t and ρ².
-type Drawn = (Aim, f64, f64);
+type Drawn = (LoadQuantity, f64, f64);
 
 impl<'a> EvenLoads<'a> {
     /// Fits from a profile's loads.
@@ -74,7 +74,7 @@ impl<'a> EvenLoads<'a> {
         extent: Extent,
         starts: &[UniformLoad],
     ) -> Option<Self> {
-        let no_loads = Minimum { unknowns: Vec::new(), misfit: f64::INFINITY };
+        let no_loads = Minimum { unknowns: Vec::new(), chi_squared: f64::INFINITY };
         let loads = Self { table, y, dimensions: extent.dimensions(), best: no_loads };
         // The profile's prior moves loads inwards; a larger force nearer to the support may have the same
         // moment.
@@ -88,11 +88,12 @@ impl<'a> EvenLoads<'a> {
     /// Best of several starts, along x.
     fn fit_from(&self, starts: Vec<Vec<f64>>) -> Option<Self> {
         let fits = starts.into_iter().map(|start| self.minimum(start, None, &[]));
-        let best =
-            fits.min_by(|a, b| a.misfit.total_cmp(&b.misfit)).filter(|best| best.misfit.is_finite())?;
+        let best = fits
+            .min_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared))
+            .filter(|best| best.chi_squared.is_finite())?;
         let mut loads: Vec<&[f64]> = best.unknowns.chunks(self.each()).collect();
         loads.sort_by(|a, b| a[1].total_cmp(&b[1]));
-        let best = Minimum { unknowns: loads.concat(), misfit: best.misfit };
+        let best = Minimum { unknowns: loads.concat(), chi_squared: best.chi_squared };
         Some(Self { table: self.table, y: self.y, dimensions: self.dimensions, best })
     }
 
@@ -170,8 +171,8 @@ impl<'a> EvenLoads<'a> {
         self.load(&self.best.unknowns[number * self.each()..][..self.each()])
     }
 
-    pub fn misfit(&self) -> f64 {
-        self.best.misfit
+    pub fn chi_squared(&self) -> f64 {
+        self.best.chi_squared
     }
 
     /// Load at the posterior median of its centre, with a flat prior over the interval and the others
@@ -181,7 +182,7 @@ impl<'a> EvenLoads<'a> {
         let centres: Vec<usize> =
             (0..self.dimensions).map(|axis| number * self.each() + 1 + 2 * axis).collect();
         for (axis, centre) in centres.iter().enumerate() {
-            middle[*centre] = self.median(*centre, self.interval_95(Aim::Centre(number, axis)));
+            middle[*centre] = self.median(*centre, self.interval_95(LoadQuantity::Centre(number, axis)));
         }
         let found = self.minimum(middle, None, &centres);
         self.load(&found.unknowns[number * self.each()..][..self.each()])
@@ -197,7 +198,7 @@ impl<'a> EvenLoads<'a> {
                 unknowns[unknown] = value;
                 let found = self.minimum(unknowns.clone(), None, &[unknown]);
                 unknowns.clone_from(&found.unknowns);
-                (0.5 * (self.best.misfit - found.misfit)).exp()
+                (0.5 * (self.best.chi_squared - found.chi_squared)).exp()
             })
             .collect();
         let half = 0.5 * likelihoods.iter().sum::<f64>();
@@ -218,10 +219,12 @@ impl<'a> EvenLoads<'a> {
     }
 
     /// Upper ends may be infinite.
-    pub fn interval_95(&self, aim: Aim) -> (f64, f64) {
+    pub fn interval_95(&self, aim: LoadQuantity) -> (f64, f64) {
         let whole = match aim {
-            Aim::Force(_) | Aim::Total => (0.0, f64::INFINITY),
-            Aim::Centre(_, axis) | Aim::CentreOfPressure(axis) => (0.0, self.table.side_m(axis)),
+            LoadQuantity::Force(_) | LoadQuantity::Total => (0.0, f64::INFINITY),
+            LoadQuantity::Centre(_, axis) | LoadQuantity::CentreOfPressure(axis) => {
+                (0.0, self.table.side_m(axis))
+            }
         };
         let Some(sd) = self.sd(aim) else { return whole };
         let [low, high] = [-sd, sd].map(|step| self.end(aim, step));
@@ -296,12 +299,12 @@ impl<'a> EvenLoads<'a> {
         (residuals, slopes)
     }
 
-    fn value_at(&self, aim: Aim, unknowns: &[f64]) -> f64 {
+    fn value_at(&self, aim: LoadQuantity, unknowns: &[f64]) -> f64 {
         match aim {
-            Aim::Force(load) => unknowns[load * self.each()],
-            Aim::Total => unknowns.chunks(self.each()).map(|load| load[0]).sum(),
-            Aim::Centre(load, axis) => unknowns[load * self.each() + 1 + 2 * axis],
-            Aim::CentreOfPressure(axis) => {
+            LoadQuantity::Force(load) => unknowns[load * self.each()],
+            LoadQuantity::Total => unknowns.chunks(self.each()).map(|load| load[0]).sum(),
+            LoadQuantity::Centre(load, axis) => unknowns[load * self.each() + 1 + 2 * axis],
+            LoadQuantity::CentreOfPressure(axis) => {
                 let loads = || unknowns.chunks(self.each());
                 let force_n: f64 = loads().map(|load| load[0]).sum();
                 loads().map(|load| load[0] * load[1 + 2 * axis]).sum::<f64>() / force_n
@@ -309,13 +312,13 @@ impl<'a> EvenLoads<'a> {
         }
     }
 
-    fn slope_of(&self, aim: Aim, unknowns: &[f64]) -> Array1<f64> {
+    fn slope_of(&self, aim: LoadQuantity, unknowns: &[f64]) -> Array1<f64> {
         let mut slope = Array1::zeros(unknowns.len());
         match aim {
-            Aim::Force(load) => slope[load * self.each()] = 1.0,
-            Aim::Total => slope.iter_mut().step_by(self.each()).for_each(|slope| *slope = 1.0),
-            Aim::Centre(load, axis) => slope[load * self.each() + 1 + 2 * axis] = 1.0,
-            Aim::CentreOfPressure(axis) => {
+            LoadQuantity::Force(load) => slope[load * self.each()] = 1.0,
+            LoadQuantity::Total => slope.iter_mut().step_by(self.each()).for_each(|slope| *slope = 1.0),
+            LoadQuantity::Centre(load, axis) => slope[load * self.each() + 1 + 2 * axis] = 1.0,
+            LoadQuantity::CentreOfPressure(axis) => {
                 let force_n: f64 = unknowns.chunks(self.each()).map(|load| load[0]).sum();
                 let centre_m = self.value_at(aim, unknowns);
                 for (k, load) in unknowns.chunks(self.each()).enumerate() {
@@ -361,14 +364,14 @@ impl<'a> EvenLoads<'a> {
                 break;
             }
         }
-        Minimum { misfit: here.misfit, unknowns }
+        Minimum { chi_squared: here.chi_squared, unknowns }
     }
 
     fn normal_equations(&self, unknowns: &[f64], drawn: Option<Drawn>) -> NormalEquations {
         let (residuals, slopes) = self.residuals(unknowns);
         let misfit = residuals.dot(&residuals);
         let mut found = NormalEquations {
-            misfit,
+            chi_squared: misfit,
             cost: misfit,
             gradient: slopes.dot(&residuals),
             hessian: slopes.dot(&slopes.t()),
@@ -414,7 +417,7 @@ impl<'a> EvenLoads<'a> {
     }
 
     /// To first order; `None` if undetermined.
-    pub fn sd(&self, aim: Aim) -> Option<f64> {
+    pub fn sd(&self, aim: LoadQuantity) -> Option<f64> {
         let unknowns = &self.best.unknowns;
         let here = self.normal_equations(unknowns, None);
         let slope = self.slope_of(aim, unknowns);
@@ -424,7 +427,7 @@ impl<'a> EvenLoads<'a> {
     }
 
     /// Value with the critical misfit; `None` without an end on the surface.
-    fn end(&self, aim: Aim, step: f64) -> Option<f64> {
+    fn end(&self, aim: LoadQuantity, step: f64) -> Option<f64> {
         let (end, unknowns) = self.end_at(aim, step, RATIO_95)?;
         if unknowns.chunks(self.each()).any(|load| self.is_whole(load)) {
             // The force of a load over the whole surface is unique, so it also determines centres and widths.
@@ -441,16 +444,16 @@ impl<'a> EvenLoads<'a> {
     }
 
     /// End for misfits up to the least plus `ratio`, with its unknowns.
-    fn end_at(&self, aim: Aim, step: f64, ratio: f64) -> Option<(f64, Vec<f64>)> {
-        let most = self.best.misfit + ratio;
+    fn end_at(&self, aim: LoadQuantity, step: f64, ratio: f64) -> Option<(f64, Vec<f64>)> {
+        let most = self.best.chi_squared + ratio;
         let stiffness = 1.0 / (step * step);
         let start = self.value_at(aim, &self.best.unknowns);
         let (mut inside, mut from, mut way) = (self.best.clone(), start, 2.0 * step);
         for _ in 0..MOST_DOUBLINGS {
             let t = start + way;
             let found = self.minimum(inside.unknowns.clone(), Some((aim, t, stiffness)), &[]);
-            if found.misfit > most {
-                return self.between((aim, stiffness, most), (from, inside), (t, found));
+            if found.chi_squared > most {
+                return self.critical_value_between((aim, stiffness, most), (from, inside), (t, found));
             }
             let (was, is) = (self.value_at(aim, &inside.unknowns), self.value_at(aim, &found.unknowns));
             (inside, from) = (found, t);
@@ -465,23 +468,25 @@ impl<'a> EvenLoads<'a> {
     }
 
     /// Critical value between two targets t.
-    fn between(
+    fn critical_value_between(
         &self,
-        (aim, stiffness, most): (Aim, f64, f64),
+        (aim, stiffness, most): (LoadQuantity, f64, f64),
         mut inside: (f64, Minimum),
         mut outside: (f64, Minimum),
     ) -> Option<(f64, Vec<f64>)> {
         for _ in 0..MOST_HALVINGS {
-            if outside.1.misfit - most < 10.0 * NEGLIGIBLE || most - inside.1.misfit < 10.0 * NEGLIGIBLE {
+            if outside.1.chi_squared - most < 10.0 * NEGLIGIBLE
+                || most - inside.1.chi_squared < 10.0 * NEGLIGIBLE
+            {
                 break;
             }
             let t = inside.0.midpoint(outside.0);
             let found = self.minimum(inside.1.unknowns.clone(), Some((aim, t, stiffness)), &[]);
-            let end = if found.misfit > most { &mut outside } else { &mut inside };
+            let end = if found.chi_squared > most { &mut outside } else { &mut inside };
             *end = (t, found);
         }
-        let [low, high] =
-            [&inside, &outside].map(|(_, minimum)| (minimum.misfit, self.value_at(aim, &minimum.unknowns)));
+        let [low, high] = [&inside, &outside]
+            .map(|(_, minimum)| (minimum.chi_squared, self.value_at(aim, &minimum.unknowns)));
         let share = (most - low.0) / (high.0 - low.0).max(f64::MIN_POSITIVE);
         let end = low.1 + share * (high.1 - low.1);
         (!self.is_at_edge(aim, &inside.1.unknowns)).then_some((end, inside.1.unknowns))
@@ -489,7 +494,7 @@ impl<'a> EvenLoads<'a> {
 
     /// At an end of the centre's range the value is unbounded: a narrower load could be nearer to the edge,
     /// with a larger force.
-    fn is_at_edge(&self, aim: Aim, unknowns: &[f64]) -> bool {
+    fn is_at_edge(&self, aim: LoadQuantity, unknowns: &[f64]) -> bool {
         let is_at_end = |i: usize| {
             let (least, most) = self.range(i);
             unknowns[i] <= least || unknowns[i] >= most
@@ -498,9 +503,9 @@ impl<'a> EvenLoads<'a> {
         let is_at_edge =
             |load: usize| (0..self.dimensions).any(|axis| is_at_end(load * self.each() + 1 + 2 * axis));
         match aim {
-            Aim::Force(load) => is_at_edge(load),
-            Aim::Centre(load, axis) => is_at_end(load * self.each() + 1 + 2 * axis),
-            Aim::Total | Aim::CentreOfPressure(_) => loads.any(is_at_edge),
+            LoadQuantity::Force(load) => is_at_edge(load),
+            LoadQuantity::Centre(load, axis) => is_at_end(load * self.each() + 1 + 2 * axis),
+            LoadQuantity::Total | LoadQuantity::CentreOfPressure(_) => loads.any(is_at_edge),
         }
     }
 }
@@ -509,7 +514,7 @@ const LEAST_FORCE_N: f64 = 1e-12;
 
 /// Half of the misfit's derivatives, by Gauss–Newton.
 struct NormalEquations {
-    misfit: f64,
+    chi_squared: f64,
     /// Misfit with penalty.
     cost: f64,
     gradient: Array1<f64>,
@@ -553,17 +558,17 @@ mod tests {
         let load = UniformLoad::along(0.01, 0.03, 2000.0);
         let y = clean(&sensors, &[load]).iter().map(|value| value / 2e-6).collect();
         let even = EvenLoads::new(&table, &y, sensors.extent, &[load]).unwrap();
-        assert!(even.misfit() < 1.0, "{}", even.misfit());
+        assert!(even.chi_squared() < 1.0, "{}", even.chi_squared());
         let (moment, farthest_m) = (2000.0 * 0.02, (0.02_f64.powi(2) + 0.02_f64.powi(2) / 4.0).sqrt());
         let near = |(low, high): (f64, f64), expected: (f64, f64)| {
             let off = (low / expected.0 - 1.0).abs().max((high / expected.1 - 1.0).abs());
             assert!(off < 0.02, "{low} to {high}, not {expected:?}");
         };
         let root = 2.0_f64.sqrt();
-        near(even.interval_95(Aim::Centre(0, 0)), (farthest_m / root, farthest_m));
-        near(even.interval_95(Aim::CentreOfPressure(0)), (farthest_m / root, farthest_m));
-        near(even.interval_95(Aim::Force(0)), (moment / farthest_m, moment / farthest_m * root));
-        near(even.interval_95(Aim::Total), (moment / farthest_m, moment / farthest_m * root));
+        near(even.interval_95(LoadQuantity::Centre(0, 0)), (farthest_m / root, farthest_m));
+        near(even.interval_95(LoadQuantity::CentreOfPressure(0)), (farthest_m / root, farthest_m));
+        near(even.interval_95(LoadQuantity::Force(0)), (moment / farthest_m, moment / farthest_m * root));
+        near(even.interval_95(LoadQuantity::Total), (moment / farthest_m, moment / farthest_m * root));
         let middle = even.middle_load(0);
         assert!(
             (middle.centre().x_m / 0.02 - 1.0).abs() < 0.15 && (middle.force_n() / 2000.0 - 1.0).abs() < 0.15,

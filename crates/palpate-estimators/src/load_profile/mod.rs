@@ -32,18 +32,18 @@ use std::sync::Arc;
 
 use crate::fit::{LARGEST, ReadingError};
 use crate::setup::Setup;
-use crate::status::misfit_bound;
+use crate::status::chi_squared_bound;
 use bounds::Bounds;
 use cumulative::CumulativeInfluence;
-use even_loads::Aim;
+use even_loads::LoadQuantity;
 use palpate_core::Status;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, NoiseError, Sensor};
 use palpate_mechanics::surface::{Extent, InfluenceFunction, Surface, UniformLoad, Unsolvable};
 use palpate_numerics::watch::{Cancelled, Watch};
-use palpate_numerics::{Cholesky, holding, hull, median, normal_interval_95};
+use palpate_numerics::{Cholesky, extend_to, hull, median, normal_interval_95};
 use patch_number::{PatchLoads, Tables};
-use patches::{centre_of, find_patches, holds, mean_position, nearest};
+use patches::{centre_of, contains, find_patches, mean_position, nearest};
 use smoothness::{Mixture, Problem};
 
 /// Channel.
@@ -129,7 +129,7 @@ impl<'a> LoadSensors<'a> {
     }
 
     /// Enabled channels.
-    pub fn alive(&self) -> impl Iterator<Item = &LoadChannel<'a>> {
+    pub fn enabled(&self) -> impl Iterator<Item = &LoadChannel<'a>> {
         self.channels.iter().flatten()
     }
 }
@@ -184,7 +184,7 @@ pub struct LoadProfile {
     /// Residuals over noise; `None` if disabled.
     pub residuals: Vec<Option<f64>>,
     /// Least sum of squared residuals.
-    pub misfit: f64,
+    pub chi_squared: f64,
     /// Goodness-of-fit bound of the misfit, error rate 0.001.
     pub worst_misfit: f64,
     /// Most probable λ, in 1/N²; `None` without load.
@@ -214,7 +214,7 @@ impl<'a> Profiler<'a> {
     /// Creates a profiler.
     pub fn new(sensors: LoadSensors<'a>) -> Self {
         let cells = Cells::new(sensors.extent);
-        let worst_misfit = misfit_bound(sensors.alive().count());
+        let worst_misfit = chi_squared_bound(sensors.enabled().count());
         let cumulative = CumulativeInfluence::new(&sensors, &cells);
         let problem = Problem::new(cumulative.over_cells(&cells), cells.roughness());
         Self { sensors, cells, problem, cumulative, worst_misfit }
@@ -261,10 +261,12 @@ impl<'a> Profiler<'a> {
         let shapes = Bounds::new(&self.problem.influence, &y);
         let mut bounds = self.bounds(&shapes, &y, total_n);
         let even = self.patch_loads(&shapes, &y, &patches);
-        let misfit = even.as_ref().map_or(least_misfit, |even| least_misfit.min(even.reported.misfit()));
+        let misfit = even.as_ref().map_or(least_misfit, |even| least_misfit.min(even.reported.chi_squared()));
         if let Some(centre) = &mut centre {
             match &even {
-                Some(even) => self.follow(even, &mut patches, (centre, &mut total_n, &mut bounds)),
+                Some(even) => {
+                    self.apply_uniform_loads(even, &mut patches, (centre, &mut total_n, &mut bounds))
+                }
                 None => self.take_bounds(&shapes, &mut patches, centre),
             }
         }
@@ -289,7 +291,7 @@ impl<'a> Profiler<'a> {
             covariance_n2: covariance,
             fitted,
             residuals,
-            misfit,
+            chi_squared: misfit,
             worst_misfit: self.worst_misfit,
             smoothness,
         })
@@ -298,7 +300,7 @@ impl<'a> Profiler<'a> {
     fn bounds(&self, shapes: &Bounds, y: &Array1<f64>, total_n: f64) -> ForceBounds {
         let influence = &self.problem.influence;
         let cells = self.cells.len();
-        let total_95_n = holding(shapes.of_sum(&Array1::ones(cells)), total_n);
+        let total_95_n = extend_to(shapes.of_sum(&Array1::ones(cells)), total_n);
         if total_n <= 0.0 {
             return ForceBounds { total_95_n, margin_m: 0.0, seen_95_n: total_95_n };
         }
@@ -306,7 +308,7 @@ impl<'a> Profiler<'a> {
         let seen: Vec<usize> = (0..cells).filter(|cell| !blind.contains(cell)).collect();
         let of_seen = Bounds::new(&influence.select(Axis(1), &seen), y).of_sum(&Array1::ones(seen.len()));
         let margin_m = blind.iter().map(|cell| self.cells.edge_distance_m(*cell)).fold(0.0, f64::max);
-        ForceBounds { total_95_n, margin_m, seen_95_n: holding(of_seen, total_n) }
+        ForceBounds { total_95_n, margin_m, seen_95_n: extend_to(of_seen, total_n) }
     }
 
     /// `None` if the misfit exceeds the noise.
@@ -323,12 +325,12 @@ impl<'a> Profiler<'a> {
             influence: &self.problem.influence,
             least_misfit: shapes.least_misfit(),
         };
-        PatchLoads::new(&tables, y, &starts).filter(|even| even.reported.misfit() <= self.worst_misfit)
+        PatchLoads::new(&tables, y, &starts).filter(|even| even.reported.chi_squared() <= self.worst_misfit)
     }
 
     /// Applies the number and intervals of uniform loads, and their values where these intervals exclude the
     /// profile's.
-    fn follow(
+    fn apply_uniform_loads(
         &self,
         PatchLoads { reported, unresolved }: &PatchLoads,
         patches: &mut Vec<Patch>,
@@ -340,7 +342,7 @@ impl<'a> Profiler<'a> {
                 (0..reported.count()).map(|number| Patch::of_even_loads(reported, number, extent)).collect();
         }
         for (number, patch) in patches.iter_mut().enumerate() {
-            patch.follow(reported, number, extent);
+            patch.adopt_intervals(reported, number, extent);
         }
         if let Some(even) = unresolved {
             let nearest: Vec<Option<usize>> =
@@ -350,20 +352,20 @@ impl<'a> Profiler<'a> {
                 patch.widen(even, &loads.collect::<Vec<usize>>(), extent);
             }
         }
-        let mut of_total = reported.interval_95(Aim::Total);
-        centre.follow(reported, extent, Aim::CentreOfPressure);
+        let mut of_total = reported.interval_95(LoadQuantity::Total);
+        centre.adopt_position_intervals(reported, extent, LoadQuantity::CentreOfPressure);
         if let Some(even) = unresolved {
-            of_total = hull(of_total, even.interval_95(Aim::Total));
-            centre.widen(even, extent, [Aim::CentreOfPressure].into_iter());
+            of_total = hull(of_total, even.interval_95(LoadQuantity::Total));
+            centre.widen(even, extent, [LoadQuantity::CentreOfPressure].into_iter());
         }
-        let is_held = centre.contains(centre.position) && holds(of_total, *total_n);
+        let is_held = centre.contains(centre.position) && contains(of_total, *total_n);
         if !is_held {
             centre.move_to(mean_position(patches));
             *total_n = patches.iter().map(|patch| patch.force_n).sum();
         }
         // Uniform loads may be narrower than a cell.
-        bounds.total_95_n = holding(hull(bounds.total_95_n, of_total), *total_n);
-        bounds.seen_95_n = holding(bounds.seen_95_n, *total_n);
+        bounds.total_95_n = extend_to(hull(bounds.total_95_n, of_total), *total_n);
+        bounds.seen_95_n = extend_to(bounds.seen_95_n, *total_n);
     }
 
     /// Applies the bounds of any shape, with cells assigned to the nearest patch.
@@ -374,7 +376,7 @@ impl<'a> Profiler<'a> {
                 (0..nearest.len()).filter(|cell| nearest[*cell] == Some(number)).collect();
             let mut c = Array1::zeros(nearest.len());
             listed.iter().for_each(|cell| c[*cell] = 1.0);
-            patch.force_95_n = holding(bounds.of_sum(&c), patch.force_n);
+            patch.force_95_n = extend_to(bounds.of_sum(&c), patch.force_n);
             patch.centre.take_bounds(bounds, &self.cells, &listed);
         }
         let everything: Vec<usize> = (0..nearest.len()).collect();
@@ -469,7 +471,7 @@ pub struct PatchLimit {
 pub fn patch_limits(sensors: &LoadSensors, loads: &[UniformLoad]) -> Option<Vec<PatchLimit>> {
     // Force, and coordinates of the centre.
     let each = 1 + sensors.extent.dimensions();
-    let alive: Vec<_> = sensors.alive().collect();
+    let alive: Vec<_> = sensors.enabled().collect();
     let mut slopes = Array2::zeros((alive.len(), each * loads.len()));
     for (channel, mut row) in alive.iter().zip(slopes.outer_iter_mut()) {
         for (number, load) in loads.iter().enumerate() {

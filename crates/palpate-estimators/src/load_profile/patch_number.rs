@@ -54,7 +54,7 @@ fn fits<'a>(tables: &Tables<'a>, y: &'a Array1<f64>, starts: &[UniformLoad]) -> 
     while let Some(fit) = next {
         let goes_on = fits.last().is_none_or(|fewer| rejects(&fit, fewer, UNRESOLVED_RATE));
         // More loads reduce the misfit at most to that of loads of any shape.
-        let gain = fit.misfit() - tables.least_misfit;
+        let gain = fit.chi_squared() - tables.least_misfit;
         let could_reject = gain > chi_squared_critical_value(UNRESOLVED_RATE, fit.unknowns() / fit.count());
         let has_freedom = fit.unknowns() < y.len();
         next = if goes_on && could_reject && has_freedom {
@@ -69,5 +69,5 @@ fn fits<'a>(tables: &Tables<'a>, y: &'a Array1<f64>, starts: &[UniformLoad]) -> 
 
 fn rejects(more: &EvenLoads, fewer: &EvenLoads, error_rate: f64) -> bool {
     let unknowns = more.unknowns() - fewer.unknowns();
-    fewer.misfit() - more.misfit() > chi_squared_critical_value(error_rate, unknowns)
+    fewer.chi_squared() - more.chi_squared() > chi_squared_critical_value(error_rate, unknowns)
 }

@@ -2,12 +2,12 @@
 
 use super::bounds::Bounds;
 use super::cells::Cells;
-use super::even_loads::{Aim, EvenLoads};
+use super::even_loads::{EvenLoads, LoadQuantity};
 use crate::status::OUTSIDE_MODEL_RATE;
 use ndarray::Array2;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::{Extent, UniformLoad};
-use palpate_numerics::{holding, hull, normal_interval_95, normal_quantile};
+use palpate_numerics::{extend_to, hull, normal_interval_95, normal_quantile};
 use serde::Serialize;
 
 /// Density threshold over the highest density.
@@ -55,7 +55,12 @@ impl CentreOfPressure {
     }
 
     /// Adopts intervals; true if they contain the position.
-    pub(super) fn follow(&mut self, even: &EvenLoads, extent: Extent, aim: impl Fn(usize) -> Aim) -> bool {
+    pub(super) fn adopt_position_intervals(
+        &mut self,
+        even: &EvenLoads,
+        extent: Extent,
+        aim: impl Fn(usize) -> LoadQuantity,
+    ) -> bool {
         self.x_95_m = even.interval_95(aim(0));
         if extent.dimensions() > 1 {
             self.y_95_m = even.interval_95(aim(1));
@@ -64,14 +69,14 @@ impl CentreOfPressure {
     }
 
     pub(super) fn contains(&self, position: Position) -> bool {
-        holds(self.x_95_m, position.x_m) && holds(self.y_95_m, position.y_m)
+        contains(self.x_95_m, position.x_m) && contains(self.y_95_m, position.y_m)
     }
 
     pub(super) fn widen(
         &mut self,
         even: &EvenLoads,
         extent: Extent,
-        aims: impl Iterator<Item = impl Fn(usize) -> Aim>,
+        aims: impl Iterator<Item = impl Fn(usize) -> LoadQuantity>,
     ) {
         for aim in aims {
             self.x_95_m = hull(self.x_95_m, even.interval_95(aim(0)));
@@ -87,17 +92,17 @@ impl CentreOfPressure {
             let at: Vec<f64> = listed.iter().map(|cell| coordinate(cells.centre(*cell))).collect();
             bounds.of_mean(listed, &at)
         };
-        self.x_95_m = holding(along(|p| p.x_m), self.position.x_m);
+        self.x_95_m = extend_to(along(|p| p.x_m), self.position.x_m);
         if cells.extent.dimensions() > 1 {
-            self.y_95_m = holding(along(|p| p.y_m), self.position.y_m);
+            self.y_95_m = extend_to(along(|p| p.y_m), self.position.y_m);
         }
     }
 
     /// Extends the intervals to contain the position.
     pub(super) fn move_to(&mut self, position: Position) {
         self.position = position;
-        self.x_95_m = holding(self.x_95_m, position.x_m);
-        self.y_95_m = holding(self.y_95_m, position.y_m);
+        self.x_95_m = extend_to(self.x_95_m, position.x_m);
+        self.y_95_m = extend_to(self.y_95_m, position.y_m);
     }
 }
 
@@ -106,39 +111,44 @@ impl Patch {
     pub(super) fn of_even_loads(even: &EvenLoads, number: usize, extent: Extent) -> Self {
         let load = even.middle_load(number);
         let sd = |aim| even.sd(aim).unwrap_or(f64::INFINITY);
-        let sd_y_m = if extent.dimensions() > 1 { sd(Aim::Centre(number, 1)) } else { 0.0 };
+        let sd_y_m = if extent.dimensions() > 1 { sd(LoadQuantity::Centre(number, 1)) } else { 0.0 };
         let force_n = load.force_n();
         Self {
             from: load.from(),
             to: load.to(),
-            centre: CentreOfPressure::new(load.centre(), (sd(Aim::Centre(number, 0)), sd_y_m)),
+            centre: CentreOfPressure::new(load.centre(), (sd(LoadQuantity::Centre(number, 0)), sd_y_m)),
             force_n,
-            force_sd_n: sd(Aim::Force(number)),
+            force_sd_n: sd(LoadQuantity::Force(number)),
             force_95_n: (force_n, force_n),
         }
     }
 
     /// Adopts intervals, and values that were outside.
-    pub(super) fn follow(&mut self, even: &EvenLoads, number: usize, extent: Extent) {
-        self.force_95_n = even.interval_95(Aim::Force(number));
-        let is_held = self.centre.follow(even, extent, |axis| Aim::Centre(number, axis));
-        if !(is_held && holds(self.force_95_n, self.force_n)) {
+    pub(super) fn adopt_intervals(&mut self, even: &EvenLoads, number: usize, extent: Extent) {
+        self.force_95_n = even.interval_95(LoadQuantity::Force(number));
+        let is_held =
+            self.centre.adopt_position_intervals(even, extent, |axis| LoadQuantity::Centre(number, axis));
+        if !(is_held && contains(self.force_95_n, self.force_n)) {
             let load = even.middle_load(number);
             (self.from, self.to, self.force_n) = (load.from(), load.to(), load.force_n());
             self.centre.move_to(load.centre());
-            self.force_95_n = holding(self.force_95_n, self.force_n);
+            self.force_95_n = extend_to(self.force_95_n, self.force_n);
         }
     }
 
     /// Widens by several candidate loads.
     pub(super) fn widen(&mut self, even: &EvenLoads, numbers: &[usize], extent: Extent) {
         for number in numbers {
-            self.force_95_n = hull(self.force_95_n, even.interval_95(Aim::Force(*number)));
+            self.force_95_n = hull(self.force_95_n, even.interval_95(LoadQuantity::Force(*number)));
         }
-        self.centre.widen(even, extent, numbers.iter().map(|number| |axis| Aim::Centre(*number, axis)));
+        self.centre.widen(
+            even,
+            extent,
+            numbers.iter().map(|number| |axis| LoadQuantity::Centre(*number, axis)),
+        );
         let sum_n = numbers.iter().map(|number| even.fitted_load(*number).force_n()).sum();
         if !numbers.is_empty() {
-            self.force_95_n = holding(self.force_95_n, sum_n);
+            self.force_95_n = extend_to(self.force_95_n, sum_n);
         }
     }
 
@@ -163,7 +173,7 @@ impl Patch {
     }
 }
 
-pub(super) fn holds((low, high): (f64, f64), value: f64) -> bool {
+pub(super) fn contains((low, high): (f64, f64), value: f64) -> bool {
     (low..=high).contains(&value)
 }
 

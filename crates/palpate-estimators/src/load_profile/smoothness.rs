@@ -36,7 +36,7 @@ pub(super) struct Mixture {
 struct Level {
     smoothness: f64,
     log_evidence: f64,
-    misfit: f64,
+    chi_squared: f64,
     minimum: NonNegative,
 }
 
@@ -54,7 +54,7 @@ impl Problem {
         let sum: f64 = shares.iter().sum();
         let weighed: Vec<(f64, &Level)> = shares.iter().map(|share| share / sum).zip(&levels).collect();
         let (forces, covariance) = self.mixture(&weighed);
-        let least_misfit = levels.iter().fold(f64::INFINITY, |least, level| least.min(level.misfit));
+        let least_misfit = levels.iter().fold(f64::INFINITY, |least, level| least.min(level.chi_squared));
         Some(Mixture { forces, covariance, smoothness: best.smoothness, least_misfit })
     }
 
@@ -103,7 +103,7 @@ impl Problem {
         let free = minimum.free.len() as f64;
         let log_evidence = -0.5 * (misfit + smoothness * roughness) - rate * force
             + 0.5 * (free * smoothness.ln() + prior.log_determinant() - minimum.factor.log_determinant());
-        Some(Level { smoothness, log_evidence, misfit, minimum })
+        Some(Level { smoothness, log_evidence, chi_squared: misfit, minimum })
     }
 
     /// Σ w·x and Σ w·(H⁻¹ + (x − mean)·(x − mean)ᵀ).

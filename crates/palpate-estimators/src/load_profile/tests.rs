@@ -70,7 +70,7 @@ fn tally(strain: bool, readings: usize) -> Tally {
     let profiler = Profiler::new(sensors.clone());
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let mut tally = Tally::default();
-    let holds = |(low, high): (f64, f64), value: f64| usize::from((low..=high).contains(&value));
+    let covers = |(low, high): (f64, f64), value: f64| usize::from((low..=high).contains(&value));
     for _ in 0..readings {
         let profile = profiler.profile(&noisy(&sensors, &clean, &mut rng)).unwrap();
         assert!(matches!(profile.status, Status::Located | Status::Ambiguous), "{:?}", profile.status);
@@ -78,8 +78,8 @@ fn tally(strain: bool, readings: usize) -> Tally {
         let percent = 100.0 * (profile.total_n / 4.0 - 1.0).abs();
         tally.worst_force_percent = tally.worst_force_percent.max(percent);
         tally.within_2_percent += usize::from(percent <= 2.0);
-        tally.total_covered += holds(profile.bounds.total_95_n, 4.0);
-        tally.pressure_covered += holds(profile.centre.unwrap().x_95_m, 0.2);
+        tally.total_covered += covers(profile.bounds.total_95_n, 4.0);
+        tally.pressure_covered += covers(profile.centre.unwrap().x_95_m, 0.2);
         let [left, right] = profile.patches[..] else { continue };
         tally.two += 1;
         let mut near = true;
@@ -87,8 +87,8 @@ fn tally(strain: bool, readings: usize) -> Tally {
             let off = (patch.centre.position.x_m - load.centre().x_m) / limit.sd_x_m;
             near &= off.abs() <= 3.0;
             tally.centre_squares += off * off;
-            tally.centres_covered += holds(patch.centre.x_95_m, load.centre().x_m);
-            tally.forces_covered += holds(patch.force_95_n, load.force_n());
+            tally.centres_covered += covers(patch.centre.x_95_m, load.centre().x_m);
+            tally.forces_covered += covers(patch.force_95_n, load.force_n());
         }
         tally.within_3_limits += usize::from(near);
     }
@@ -97,7 +97,7 @@ fn tally(strain: bool, readings: usize) -> Tally {
 
 /// A sample of the experiment `load-profiles`.
 #[test]
-fn two_patches_are_told_at_their_limits() {
+fn two_patches_are_resolved_at_their_limits() {
     const READINGS: usize = 24;
     let tally = tally(true, READINGS);
     assert!(tally.worst_force_percent < 2.0 && tally.two + 1 >= READINGS, "{tally:?}");
@@ -114,7 +114,7 @@ fn two_patches_are_told_at_their_limits() {
 
 /// A sample of the experiment `load-profiles`: 192 of its 200 readings have two patches.
 #[test]
-fn deflections_alone_tell_less() {
+fn deflections_alone_have_wider_intervals() {
     const READINGS: usize = 24;
     let tally = tally(false, READINGS);
     // Fewer than 19 of 24 readings have two patches with probability 0.001.
@@ -162,7 +162,7 @@ fn an_even_load_is_smooth_and_one_patch() {
 fn silence_and_impossible_readings_have_their_status() {
     let beam = beam();
     let mut layout = layout(true);
-    layout.set_dead(3, true);
+    layout.set_disabled(3, true);
     let sensors = LoadSensors::new(&beam, &layout).unwrap();
     let profiler = Profiler::new(sensors.clone());
     let silent = profiler.profile(&[0.0; 16]).unwrap();
@@ -181,7 +181,11 @@ fn silence_and_impossible_readings_have_their_status() {
     assert!(profiler.profile(&[0.0; 3]).is_err() && profiler.profile(&[f64::NAN; 16]).is_err());
     // Huge values give finite results.
     let absurd = profiler.profile(&[1e300; 16]).unwrap();
-    assert!(absurd.status == Status::OutsideModel && absurd.misfit.is_finite(), "{}", absurd.misfit);
+    assert!(
+        absurd.status == Status::OutsideModel && absurd.chi_squared.is_finite(),
+        "{}",
+        absurd.chi_squared
+    );
     assert!(absurd.total_n.is_finite() && absurd.forces_n.iter().all(|force| force.is_finite()));
 }
 
@@ -192,7 +196,7 @@ fn sensors_without_noise_or_life_are_refused() {
     layout.edit(|sensors| sensors[1].channel.noise_sd = 0.0).unwrap();
     let Err(error) = LoadSensors::new(&beam, &layout) else { panic!("clean sensors were taken") };
     assert!(matches!(error, LoadSensorsError::Noise(NoiseError::Singular { number: 2, .. })), "{error}");
-    layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.dead = true)).unwrap();
+    layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.disabled = true)).unwrap();
     let Err(error) = LoadSensors::new(&beam, &layout) else { panic!("dead sensors were taken") };
     assert_eq!(error, LoadSensorsError::Noise(NoiseError::AllDead { count: 8 }));
 }
@@ -267,7 +271,7 @@ pub(super) fn foam_layout() -> Layout {
 }
 
 #[test]
-fn on_a_plane_two_squares_are_told_apart() {
+fn two_squares_on_a_plane_are_resolved() {
     let sensors = LoadSensors::new(&Foam, &foam_layout()).unwrap();
     let square = |x_m: f64, y_m: f64, force_n: f64| {
         let corner = |off_m: f64| Position { x_m: x_m + off_m, y_m: y_m + off_m };
@@ -314,11 +318,11 @@ fn covered_by_distance(readings: usize) -> Vec<[f64; 3]> {
             let total_n: f64 = loads.iter().map(|load| load.force_n()).sum();
             let bounds =
                 profiler.profile(&noisy(&sensors, &clean(&sensors, &loads), &mut rng)).unwrap().bounds;
-            let holds = |(low, high): (f64, f64)| usize::from(low <= total_n && total_n <= high);
-            held += holds(bounds.total_95_n);
+            let covers = |(low, high): (f64, f64)| usize::from(low <= total_n && total_n <= high);
+            held += covers(bounds.total_95_n);
             if loads[0].from().x_m >= bounds.margin_m {
                 seen += 1;
-                seen_held += holds(bounds.seen_95_n);
+                seen_held += covers(bounds.seen_95_n);
             }
         }
         [held as f64 / readings as f64, seen as f64 / readings as f64, seen_held as f64 / seen.max(1) as f64]
@@ -330,7 +334,7 @@ const DISTANCES_M: [(f64, f64); 3] = [(0.01, 0.015), (0.02, 0.04), (0.1, 0.2)];
 
 /// A sample of the experiment `load-profiles`.
 #[test]
-fn totals_are_held_wherever_the_load_lies() {
+fn interval_of_the_total_covers_any_load() {
     const READINGS: usize = 20;
     for ((from_m, _), [held, seen, seen_held]) in DISTANCES_M.into_iter().zip(covered_by_distance(READINGS)) {
         // With a coverage of 95 %, fewer than 16 of 20 intervals cover with probability 0.003.
@@ -339,7 +343,7 @@ fn totals_are_held_wherever_the_load_lies() {
 }
 
 #[test]
-fn a_load_next_to_a_support_is_not_told_as_a_lighter_one() {
+fn load_next_to_a_support_is_not_underestimated() {
     // Two loads of 2 N, one at 5 to 25 mm from the support: the profile places it at 45 mm, with a total of
     // 2.7 N.
     let beam = beam();
@@ -405,5 +409,5 @@ fn uneven_loads_have_the_intervals_of_any_shape() {
     let profile = Profiler::new(sensors).profile(&reading).unwrap();
     let (low_m, high_m) = profile.centre.unwrap().x_95_m;
     assert!(low_m <= centre_m && centre_m <= high_m, "{centre_m}: {low_m} to {high_m}");
-    assert!(holds(profile.bounds.total_95_n, total_n), "{total_n} {:?}", profile.bounds);
+    assert!(contains(profile.bounds.total_95_n, total_n), "{total_n} {:?}", profile.bounds);
 }

@@ -97,7 +97,7 @@ impl Neighbours {
             count: best + 1,
             rows,
             force_n: task.setup.force_n(),
-            spread: errors.get(best).and_then(|errors| HeldOutErrors::from_errors(errors)),
+            held_out_errors: errors.get(best).and_then(|errors| HeldOutErrors::from_errors(errors)),
         };
         Ok((errors.get(best).map_or(f64::INFINITY, square), locator))
     }
@@ -137,7 +137,8 @@ pub struct NeighboursLocator {
     /// Known force.
     pub force_n: Option<f64>,
     /// Held-out errors.
-    pub spread: Option<HeldOutErrors>,
+    #[serde(rename = "spread")]
+    pub held_out_errors: Option<HeldOutErrors>,
 }
 
 /// Training row.
@@ -158,7 +159,7 @@ impl Locate for NeighboursLocator {
         let Some(position) = means(&found).pop() else {
             return NO_CONTACT;
         };
-        let uncertainty = self.spread.map(|spread| spread.uncertainty(position));
+        let uncertainty = self.held_out_errors.map(|spread| spread.uncertainty(position));
         on_surface(ContactEstimate { position, force_n: self.force_n, uncertainty }, self.extent)
     }
 
@@ -176,7 +177,7 @@ impl Locate for NeighboursLocator {
             let place = [row.position.x_m, row.position.y_m];
             LocatorFault::check_numbers("position", place, |_| true, "a finite number")?;
         }
-        self.spread.map_or(Ok(()), |spread| spread.check())
+        self.held_out_errors.map_or(Ok(()), |spread| spread.check())
     }
 }
 

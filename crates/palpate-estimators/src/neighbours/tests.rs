@@ -82,11 +82,11 @@ fn repeats_do_not_vouch_for_their_own_position() {
     let rows: Vec<Row> = (0..10).flat_map(|i| vec![row(0.01 * f64::from(i), 0.0, 1.0); 10]).collect();
     let locator = fit(&setup(Some(1.0)), rows).unwrap();
     assert!(locator.count > 10, "{}", locator.count);
-    assert!(locator.spread.unwrap().rms_m[0] > 1e-3);
+    assert!(locator.held_out_errors.unwrap().rms_m[0] > 1e-3);
 }
 
 #[test]
-fn what_cannot_be_compared_is_named() {
+fn unusable_recordings_are_refused() {
     let error = fit(&setup(None), vec![row(0.01, 0.0, 1.0); 5]).unwrap_err();
     assert_eq!(error.to_string(), "the recording has 1 distinct positions; at least 2 are needed");
     let alike = Row { position: Position::along(0.05), ..row(0.01, 0.0, 1.0) };

@@ -298,7 +298,7 @@ impl Fit for Network {
     type Error = NetworkFitError;
 
     fn fit_method(&self, task: FitTask) -> Result<NetworkLocator, NetworkFitError> {
-        let coded = Coded::new(self, task)?;
+        let coded = CodedTraining::new(self, task)?;
         let network = train_one(self.precision, &coded.task(), task.seed, task.watch)?;
         Ok(coded.locator(network))
     }
@@ -309,7 +309,7 @@ impl Fit for Network {
         queue: &mut dyn SeedQueue<Fitted<NetworkLocator>>,
     ) -> Result<(), NetworkFitError> {
         task.check_channels()?;
-        let coded = Coded::new(self, task)?;
+        let coded = CodedTraining::new(self, task)?;
         let map = |seed, network| Fitted::new(task.seed(seed), coded.locator(network));
         let set = InstructionSet::best();
         Ok(train_many(set, self.precision, &coded.task(), &mut Mapped { queue, map }, task.watch)?)
@@ -328,7 +328,7 @@ impl Network {
         outcome: TrainingOutcome,
     ) -> Result<Option<Fitted<NetworkLocator>>, NetworkFitError> {
         task.check_channels()?;
-        let coded = Coded::new(self, task)?;
+        let coded = CodedTraining::new(self, task)?;
         let topology = coded.topology.clone();
         Ok((weights.len() == topology.weight_count()).then(|| {
             let network = TrainedNetwork { topology, weights, outcome };
@@ -337,7 +337,7 @@ impl Network {
     }
 }
 
-struct Coded<'a> {
+struct CodedTraining<'a> {
     topology: Topology,
     patterns: TrainingSet,
     rule: &'a BackPropagation,
@@ -346,7 +346,7 @@ struct Coded<'a> {
     extent: Extent,
 }
 
-impl<'a> Coded<'a> {
+impl<'a> CodedTraining<'a> {
     fn new(config: &'a Network, FitTask { setup, recording, .. }: FitTask) -> Result<Self, NetworkFitError> {
         let rows = recording.rows.len();
         if rows == 0 {

@@ -41,12 +41,12 @@ fn check(needed: usize, found: usize) -> Result<(), BufferMismatch> {
     if needed == found { Ok(()) } else { Err(BufferMismatch { needed, found }) }
 }
 
-type Four = [f64; 4];
+type FourLanes = [f64; 4];
 
 /// Aligned, so that no column crosses a cache line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(32))]
-struct Column(Four);
+struct Column(FourLanes);
 
 #[derive(Clone, Debug, PartialEq)]
 struct Layer {
@@ -137,8 +137,8 @@ fn run_any<'a, V: Vector<4, Real = f64>>(
     layers: &[Layer],
     inputs: &[f64],
     outputs: &mut [f64],
-    mut from: &'a mut [Four],
-    mut to: &'a mut [Four],
+    mut from: &'a mut [FourLanes],
+    mut to: &'a mut [FourLanes],
 ) {
     for (k, layer) in layers.iter().enumerate() {
         pass::<V, ANY, ANY>(layer, if k == 0 { inputs } else { from.as_flattened() }, to);
@@ -152,7 +152,7 @@ fn run_any<'a, V: Vector<4, Real = f64>>(
 fn pass<V: Vector<4, Real = f64>, const INPUTS: usize, const NODES: usize>(
     layer: &Layer,
     x: &[f64],
-    a: &mut [Four],
+    a: &mut [FourLanes],
 ) {
     let (inputs, nodes) = (known_or::<INPUTS>(layer.inputs), known_or::<NODES>(layer.nodes));
     let (x, a) = (&x[..inputs], &mut a[..nodes.div_ceil(4)]);

@@ -22,7 +22,7 @@ fn presses() -> Recording {
 }
 
 /// Locator of every learnt kind. Networks are trained briefly, to keep the test short.
-fn learnt(setup: &Setup) -> Vec<Locator> {
+fn learning_locators(setup: &Setup) -> Vec<Locator> {
     let presses = presses();
     let all = contenders(setup, &Estimator::default(), 20 * presses.rows.len());
     let learnt = all.iter().filter(|estimator| crate::estimator::is_learnt(estimator.kind()));
@@ -59,12 +59,12 @@ fn readings(
     (0..400).map(one).collect()
 }
 
-fn holds(estimate: &Estimate, at: Position) -> bool {
+fn covers(estimate: &Estimate, at: Position) -> bool {
     estimate.contact.uncertainty.is_some_and(|told| told.x_95_m.0 <= at.x_m && at.x_m <= told.x_95_m.1)
 }
 
 #[test]
-fn learnt_methods_doubt_what_no_contact_reads() {
+fn learning_methods_mark_unexplained_readings_outside_model() {
     let outside = |estimate: &Estimate, _| estimate.status == Status::OutsideModel;
     let two = readings(|at, x_m, _| {
         let other_m = if x_m < 0.2 { x_m + 0.05 } else { x_m - 0.05 };
@@ -81,7 +81,7 @@ fn learnt_methods_doubt_what_no_contact_reads() {
     let absurd = readings(|_, _, rng| (0..8).map(|_| 1e9 * rng.random_range(-1.0..1.0)).collect());
     let noise = readings(|_, _, _| vec![0.0; 8]);
     let clean = readings(|at, x_m, _| at(x_m, 3.0));
-    for locator in learnt(&beam(Some(newtons(3.0)))) {
+    for locator in learning_locators(&beam(Some(newtons(3.0)))) {
         let kind = locator.kind();
         for (name, wrong) in [("two", &two), ("stuck", &stuck), ("turned", &turned), ("absurd", &absurd)] {
             let told = percent(&locator, wrong, outside);
@@ -96,13 +96,13 @@ fn learnt_methods_doubt_what_no_contact_reads() {
 
 #[test]
 fn intervals_hold_contacts_of_other_forces_than_the_presses() {
-    for locator in learnt(&beam(None)) {
+    for locator in learning_locators(&beam(None)) {
         for force_n in [1.5, 3.0, 6.0] {
             let clean = readings(|at, x_m, _| at(x_m, force_n));
-            let covered = percent(&locator, &clean, holds);
+            let covered = percent(&locator, &clean, covers);
             assert!((92.5..=99.0).contains(&covered), "{}, {force_n} N: {covered} %", locator.kind());
             let holds_itself = |estimate: &Estimate, _| {
-                estimate.status == Status::OutsideModel || holds(estimate, estimate.contact.position)
+                estimate.status == Status::OutsideModel || covers(estimate, estimate.contact.position)
             };
             assert_eq!(percent(&locator, &clean, holds_itself), 100.0, "{}", locator.kind());
         }
@@ -110,8 +110,8 @@ fn intervals_hold_contacts_of_other_forces_than_the_presses() {
 }
 
 #[test]
-fn presses_of_one_force_tell_no_other() {
-    for locator in learnt(&beam(None)) {
+fn presses_of_one_force_do_not_extrapolate_to_another() {
+    for locator in learning_locators(&beam(None)) {
         let estimate = locator.locate(&presses().rows[90].reading).unwrap();
         assert_eq!(estimate.contact.force_n, None, "{}", locator.kind());
     }
@@ -161,7 +161,7 @@ fn comparisons_of_unknown_forces_judge_by_several() {
     let training = Training { force_n: Some(2.0), ..Training::even(10) };
     let forces = |setup: &Setup| -> Vec<f64> {
         let calibration = Calibration::from_training(setup, &training).unwrap().at_forces_of_use();
-        let judged = calibration.simulate(0).unwrap().judged;
+        let judged = calibration.simulate(0).unwrap().held_out;
         judged.rows.iter().take(4).filter_map(|row| row.force_n).collect()
     };
     assert_eq!(forces(&beam(None)), [2.0, 1.0, 4.0, 2.0]);
@@ -219,7 +219,7 @@ fn own_intervals_stand_where_they_are_shorter() {
 }
 
 #[test]
-fn a_force_that_is_said_to_be_known_leaves_intervals_to_the_check() {
+fn known_force_leaves_intervals_to_the_check() {
     let setup = beam(Some(newtons(3.0)));
     let locator = Estimator::GaussianProcess(GaussianProcessEstimator::default())
         .fit_without_interval_check(FitTask::new(&setup, &presses()))

@@ -52,7 +52,7 @@ impl<'a> Cells<'a> {
     }
 
     pub fn check_grouping(&self, index: usize) -> Result<(), CsvError> {
-        self.groupings.doubt_in(index, &self.dialect.source).map_or(Ok(()), Err)
+        self.groupings.ambiguity_in(index, &self.dialect.source).map_or(Ok(()), Err)
     }
 
     pub fn width(&self) -> usize {
@@ -73,7 +73,7 @@ impl<'a> Cells<'a> {
         match self.width() {
             found if found == expected => Ok(()),
             _ if beyond.is_some_and(|beyond| beyond.iter().all(|field| field.value.is_empty())) => Ok(()),
-            found if beyond.is_some() && self.looks_cut_at_decimals() => {
+            found if beyond.is_some() && self.is_split_at_decimals() => {
                 Err(self.line_error(CsvProblem::CutDecimals { found, expected }))
             }
             found if self.dialect.separator == Separator::Blanks => {
@@ -84,7 +84,7 @@ impl<'a> Cells<'a> {
     }
 
     /// Commas may have split numbers at their decimal commas.
-    fn looks_cut_at_decimals(&self) -> bool {
+    fn is_split_at_decimals(&self) -> bool {
         let whole = |field: &Field| field.value.bytes().all(|byte| byte.is_ascii_digit() || byte == b'-');
         self.dialect.separator == Separator::Comma && self.fields.iter().all(whole)
     }
@@ -115,7 +115,7 @@ impl<'a> Cells<'a> {
             return Ok(index);
         }
         let said = heading.unit.unwrap_or_default().to_owned();
-        Err(self.error(index, CsvProblem::OtherUnit { said, read_as: values.unit, key }))
+        Err(self.error(index, CsvProblem::OtherUnit { heading_unit: said, read_as: values.unit, key }))
     }
 
     /// Field by heading, with or without the unit, or by number.

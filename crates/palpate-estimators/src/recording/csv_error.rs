@@ -189,11 +189,11 @@ pub enum CsvProblem {
     },
     /// Contradictory unit in a heading.
     #[error(
-        "the header has the unit `{said}`, but the column is read in {read_as}; set `{key}`, or correct the header"
+        "the header has the unit `{heading_unit}`, but the column is read in {read_as}; set `{key}`, or correct the header"
     )]
     OtherUnit {
         /// Header unit.
-        said: String,
+        heading_unit: String,
         /// Column unit.
         read_as: Unit,
         /// Rig key.

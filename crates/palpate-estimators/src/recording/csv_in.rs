@@ -131,7 +131,7 @@ impl Schema<'_> {
         recording.provenance.digests = digests;
         recording.provenance.dialects = dialects.into_iter().filter(|dialect| !dialect.is_plain()).collect();
         let recording = recording.treat_repeated_readings(self.columns.repeated_readings);
-        recording.zeroed(self.columns.zero).map_err(|error| CsvProblem::from(error).in_file(source))
+        recording.subtract_zero(self.columns.zero).map_err(|error| CsvProblem::from(error).in_file(source))
     }
 }
 
@@ -150,7 +150,7 @@ impl OpenRow {
         self
     }
 
-    fn settled(self) -> Result<Row, CsvError> {
+    fn into_row(self) -> Result<Row, CsvError> {
         self.refusal.map_or(Ok(self.row), |error| Err(*error))
     }
 }
@@ -166,7 +166,7 @@ fn settle_forces(rows: Vec<OpenRow>, columns: &Columns, dialect: &mut Dialect) -
             open.row.force_n = Some(0.0);
             open.refusal = None;
         }
-        open.settled()
+        open.into_row()
     };
     rows.into_iter().map(settle).collect()
 }
@@ -543,7 +543,7 @@ impl LineParser for TimedParser<'_> {
         let Some((mut cells, fields)) = next else { return Ok(None) };
         let time_s = fields.time.read(&mut cells, clock)?;
         let contact = fields.contact.as_ref();
-        let row = contact.map(|contact| contact.row(&mut cells, schema, time_s)?.settled()).transpose()?;
+        let row = contact.map(|contact| contact.row(&mut cells, schema, time_s)?.into_row()).transpose()?;
         // An unknown force is not 0: the surface is touched.
         let truth = row.map(|Row { position, force_n, .. }| Contact {
             position,

@@ -8,7 +8,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::csv_error::CsvProblem;
-use super::grouping::looks_grouped;
+use super::grouping::is_grouped_number;
 use super::marks::{Decimal, Separator};
 use super::zero_force::ZeroForce;
 use palpate_mechanics::units::Unit;
@@ -23,7 +23,8 @@ pub struct Dialect {
     /// Decimal mark; `None` for whole numbers.
     pub decimal: Option<Decimal>,
     /// First number with a mark that may separate thousands.
-    pub doubtful: Option<String>,
+    #[serde(rename = "doubtful")]
+    pub ambiguous_number: Option<String>,
     /// True if names matched without units.
     pub units_in_header: bool,
     /// True for Windows-1252.
@@ -114,11 +115,11 @@ impl Dialect {
         match parsed {
             Some(value) if value.is_finite() => {
                 if commas == 1 {
-                    self.see(Decimal::Comma, text)?;
-                } else if (self.decimal, &self.doubtful) != (Some(Decimal::Point), &None)
+                    self.add_decimal(Decimal::Comma, text)?;
+                } else if (self.decimal, &self.ambiguous_number) != (Some(Decimal::Point), &None)
                     && text.contains('.')
                 {
-                    self.see(Decimal::Point, text)?;
+                    self.add_decimal(Decimal::Point, text)?;
                 }
                 Ok(value)
             }
@@ -129,8 +130,8 @@ impl Dialect {
         }
     }
 
-    fn see(&mut self, mark: Decimal, text: &str) -> Result<(), CsvProblem> {
-        let doubtful = looks_grouped(text);
+    fn add_decimal(&mut self, mark: Decimal, text: &str) -> Result<(), CsvProblem> {
+        let doubtful = is_grouped_number(text);
         match self.decimal {
             Some(decimal) if decimal != mark => {
                 return Err(CsvProblem::OtherDecimal { text: text.to_owned(), decimal });
@@ -145,7 +146,7 @@ impl Dialect {
         }
         // Plain files have decimal points; with semicolons, a point may separate thousands.
         let doubtful = doubtful && (mark == Decimal::Comma || self.separator == Separator::Semicolon);
-        self.doubtful = doubtful.then(|| text.to_owned());
+        self.ambiguous_number = doubtful.then(|| text.to_owned());
         Ok(())
     }
 }
@@ -156,7 +157,7 @@ impl fmt::Display for Dialect {
         if self.separator != Separator::Comma {
             words.push(self.separator.to_string());
         }
-        match (self.decimal, &self.doubtful) {
+        match (self.decimal, &self.ambiguous_number) {
             (Some(decimal), Some(text)) => {
                 let (number, whole) = (text.replace(',', "."), text.replace([',', '.'], ""));
                 words.push(format!("{decimal} ({text} is {number}, not {whole})"));

@@ -69,7 +69,7 @@ fn files_of_loggers_are_the_plain_file() {
 }
 
 #[test]
-fn lines_that_are_no_rows_are_said() {
+fn skipped_lines_are_reported() {
     let of = |above: &str, heading: &str, separator, below: &str| {
         said(&titled(), &dressed(above, heading, separator, below))
     };

@@ -5,7 +5,7 @@ use super::marks::Decimal;
 use std::ops::Range;
 
 /// One mark that may separate thousands: `1,234`, not `0,234`.
-pub(super) fn looks_grouped(number: &str) -> bool {
+pub(super) fn is_grouped_number(number: &str) -> bool {
     let digits = number.trim_start_matches(['+', '-']);
     let all_digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
     digits.split_once([',', '.']).is_some_and(|(whole, rest)| {
@@ -23,7 +23,7 @@ pub(super) fn looks_grouped(number: &str) -> bool {
 /// ambiguous if it has whole numbers below 1000 and spans no more decades as thousands than as decimals.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Groupings {
-    is_said: bool,
+    is_reported: bool,
     columns: Vec<Grouping>,
 }
 
@@ -46,11 +46,11 @@ pub(super) struct Place {
 
 impl Groupings {
     pub fn new(decimal: Option<Decimal>) -> Self {
-        Self { is_said: decimal.is_some(), columns: Vec::new() }
+        Self { is_reported: decimal.is_some(), columns: Vec::new() }
     }
 
     pub fn is_decided(&self, column: usize) -> bool {
-        self.is_said || self.columns.get(column).is_some_and(|column| column.is_decided)
+        self.is_reported || self.columns.get(column).is_some_and(|column| column.is_decided)
     }
 
     pub fn insert(&mut self, column: usize, text: &str, place: impl FnOnce() -> Place) {
@@ -59,7 +59,7 @@ impl Groupings {
         }
         let Grouping { is_decided, whole, grouped } = &mut self.columns[column];
         let digits = text.trim_start_matches(['+', '-']);
-        let is_grouped = looks_grouped(text);
+        let is_grouped = is_grouped_number(text);
         // Separators of thousands are in all numbers or in none.
         *is_decided |= !is_grouped && (digits.len() > 3 || !digits.bytes().all(|byte| byte.is_ascii_digit()));
         let value = |value, digit| 10.0 * value + f64::from(digit - b'0');
@@ -82,14 +82,14 @@ impl Groupings {
 
     /// Error of the first ambiguous column.
     pub fn doubt(&self, source: &str) -> Option<CsvError> {
-        if self.is_said {
+        if self.is_reported {
             return None;
         }
         self.columns.iter().find_map(|column| column.doubt(source))
     }
 
-    pub fn doubt_in(&self, column: usize, source: &str) -> Option<CsvError> {
-        self.columns.get(column).filter(|_| !self.is_said)?.doubt(source)
+    pub fn ambiguity_in(&self, column: usize, source: &str) -> Option<CsvError> {
+        self.columns.get(column).filter(|_| !self.is_reported)?.doubt(source)
     }
 }
 

@@ -202,7 +202,7 @@ impl Recording {
     }
 
     /// True if every row has a force, but repeats are too few for a reliable noise estimate.
-    pub fn hardly_tells_noise(&self) -> bool {
+    pub fn has_unreliable_noise(&self) -> bool {
         let spare = self.rows.len().saturating_sub(self.distinct_positions().len() + 1);
         self.rows.iter().all(|row| row.force_n.is_some()) && spare as f64 <= LEAST_FREEDOM
     }

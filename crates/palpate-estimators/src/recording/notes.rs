@@ -76,8 +76,8 @@ pub(super) fn kind_of(
     let had_words = |i: usize| words.and_then(|words| words.get(i)).copied().unwrap_or(false);
     let filled: Vec<usize> = (0..texts.len()).filter(|i| !texts[*i].is_empty()).collect();
     let values = filled.iter().filter(|i| is_value(texts[**i])).count();
-    let is_missing = |i: &usize| texts[*i].starts_with("#") || among(texts[*i], &MISSING);
-    let is_total = |i: &usize| !had_words(*i) && among(texts[*i].trim_end_matches([':', '.']), &TOTALS);
+    let is_missing = |i: &usize| texts[*i].starts_with("#") || is_one_of(texts[*i], &MISSING);
+    let is_total = |i: &usize| !had_words(*i) && is_one_of(texts[*i].trim_end_matches([':', '.']), &TOTALS);
     // Remarks on the right of a row may have the same words.
     if words.is_some() && filled.first().is_some_and(is_total) {
         return LineKind::Note;
@@ -148,10 +148,14 @@ pub(super) fn begins_like_a_value(text: &str) -> bool {
 fn is_unit(text: &str) -> bool {
     let is_enclosed = |open, close| text.starts_with(open) && text.ends_with(close);
     let known = |text: &str| Unit::from_symbol(text).is_some_and(|unit| unit != Unit::NONE);
-    is_enclosed('[', ']') || is_enclosed('(', ')') || text == "-" || known(text) || among(text, &OTHER_UNITS)
+    is_enclosed('[', ']')
+        || is_enclosed('(', ')')
+        || text == "-"
+        || known(text)
+        || is_one_of(text, &OTHER_UNITS)
 }
 
-fn among(text: &str, words: &[&str]) -> bool {
+fn is_one_of(text: &str, words: &[&str]) -> bool {
     let text = text.to_lowercase();
     words.contains(&text.as_str())
 }

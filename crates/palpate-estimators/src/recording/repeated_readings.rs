@@ -30,7 +30,8 @@ impl RepeatedReadings {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Repeats {
     /// Removed rows.
-    pub left_out: usize,
+    #[serde(rename = "left_out")]
+    pub removed: usize,
     /// Rows in the file.
     pub of: usize,
     /// True for a logger faster than its sensors.
@@ -64,7 +65,7 @@ impl Recording {
         self.provenance.rows = self.rows.len();
         if left_out > 0 || !slow_channels.is_empty() || treatment == RepeatedReadings::Keep {
             self.provenance.repeats =
-                Some(Repeats { left_out, of, sample_and_hold: any_contact, slow_channels });
+                Some(Repeats { removed: left_out, of, sample_and_hold: any_contact, slow_channels });
         }
         self
     }

@@ -179,10 +179,10 @@ impl RepeatCounts {
 
 /// Noise of half a step; differences have standard deviation √2/2.
 fn noisy_repeat_probability() -> f64 {
-    within_steps(0.5, std::f64::consts::FRAC_1_SQRT_2)
+    probability_within(0.5, std::f64::consts::FRAC_1_SQRT_2)
 }
 
-fn within_steps(steps: f64, sd: f64) -> f64 {
+fn probability_within(steps: f64, sd: f64) -> f64 {
     1.0 - 2.0 * normal_cdf(-steps / sd)
 }
 
@@ -227,7 +227,7 @@ impl Changes {
             terms.map(|(count, share)| count * share.max(f64::MIN_POSITIVE).ln()).sum()
         };
         let rounded = |sd: f64| {
-            let (same, small) = (within_steps(0.5, sd), within_steps(LARGE_STEPS, sd));
+            let (same, small) = (probability_within(0.5, sd), probability_within(LARGE_STEPS, sd));
             [same, small - same, 2.0 * normal_cdf(-LARGE_STEPS / sd)]
         };
         // Standard deviations of differences from 0.05 to 20,000 steps, 5 % apart.

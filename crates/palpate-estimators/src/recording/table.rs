@@ -352,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_are_told_by_what_is_in_them() {
+    fn columns_are_recognized_by_their_content() {
         let text = "\u{feff}sep=;\nOrt [mm];Zeit;Notiz;leer;S1;S2;Kraft;frei\n;;;;;;;\n\
                     1,5;10:00:00;links, oben;;-3;4;;ja\n2;10:00:01;;;1e3;n/a;2,5;\n;;;;;;;\n";
         let table = table(text);

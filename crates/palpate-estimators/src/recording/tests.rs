@@ -76,7 +76,7 @@ fn columns_are_mapped_and_others_ignored() {
 }
 
 #[test]
-fn rows_have_times_where_a_column_tells_them() {
+fn rows_have_the_times_of_a_column() {
     let times = |columns: &Columns, text: &str| read_as(columns, text.as_bytes()).map(|read| read.times_s());
     let text =
         "X,Pl,Pr,F,Zeit,time_s\n10,1,2,3,03.04.2026 14:03:25,5\n12,1,2,3,03.04.2026 14:03:25.250,6.5\n";
@@ -127,7 +127,7 @@ fn untouched_rows_are_marked_by_force_column_or_time_or_found() {
 }
 
 #[test]
-fn what_cannot_mark_untouched_rows_is_refused() {
+fn invalid_marks_of_untouched_rows_are_refused() {
     let marked = Columns { untouched: Some(named("empty")), ..foreign() };
     let spans = vec!["95 s..".parse().unwrap()];
     let timed = Columns { untouched_times: spans, ..foreign() };
@@ -198,7 +198,7 @@ fn files_as_people_have_them_are_read() {
 }
 
 #[test]
-fn what_no_rule_can_tell_is_refused_at_the_place() {
+fn ambiguous_marks_are_refused_at_their_place() {
     let with = |separator, decimal| Columns { separator, decimal, ..foreign() };
     let cases: [(Columns, &[u8]); 15] = [
         (foreign(), b"X [cm],Pl,Pr,F\n1,2,3,4\n"),
@@ -365,7 +365,7 @@ fn sweeps(reading: impl Fn(usize, usize) -> f64) -> Recording {
 }
 
 #[test]
-fn channels_that_look_wrong_are_named() {
+fn suspicious_channels_are_named() {
     let ripple = |position: usize, sweep: usize| 0.01 * ((position * 31 + sweep * 17) % 7) as f64;
     let dead = sweeps(|_, _| 0.25);
     let saturated = sweeps(|position, sweep| (position as f64 + ripple(position, sweep)).min(6.0));

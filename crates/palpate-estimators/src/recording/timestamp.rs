@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_time_is_refused_in_words() {
+    fn invalid_times_are_refused() {
         let refused = |texts: &[&str]| times(texts).pop().unwrap().unwrap_err();
         let messages = [
             refused(&["now"]),

@@ -143,7 +143,7 @@ impl Recording {
             let group: Vec<&Warning> = warnings[i..].iter().filter(alike).collect();
             let mut line = group_line(&group);
             let numbers_rows = matches!(first, Warning::RepeatsDisagree { .. });
-            if numbers_rows && self.provenance.repeats.as_ref().is_some_and(|repeats| repeats.left_out > 0) {
+            if numbers_rows && self.provenance.repeats.as_ref().is_some_and(|repeats| repeats.removed > 0) {
                 line += " (row numbers without the repeated rows)";
             }
             lines.push(line);
@@ -157,7 +157,7 @@ impl Recording {
                 self.counted_repeats().map(|rows| Warning::RepeatsCounted { rows, of: self.rows.len() });
             return counted.into_iter().collect();
         };
-        let left_out = (repeats.left_out > 0).then(|| Warning::RepeatsLeftOut(repeats.clone()));
+        let left_out = (repeats.removed > 0).then(|| Warning::RepeatsLeftOut(repeats.clone()));
         let channels = repeats.slow_channels.clone();
         let slow = (!channels.is_empty()).then_some(Warning::SlowChannels { channels });
         left_out.into_iter().chain(slow).collect()
@@ -230,7 +230,8 @@ impl<'a> Channel<'a> {
     fn repeats_disagree(&self, repeats: &[Vec<usize>], drift: Option<&Warning>) -> Option<Warning> {
         if drift.is_none() {
             let driftless = self.without_drift(repeats, MOST_BLOCKS);
-            return self.far_off(&Driftless { steps: vec![0.0; self.values.len()], ..driftless }, repeats);
+            return self
+                .outlier_warning(&Driftless { steps: vec![0.0; self.values.len()], ..driftless }, repeats);
         }
         let touches = |group: &Vec<usize>| self.recording.rows[group[0]].touches();
         let (touched, untouched) = repeats.iter().cloned().partition::<Vec<_>, _>(touches);
@@ -240,11 +241,11 @@ impl<'a> Channel<'a> {
             (apart.values[*i], apart.steps[*i]) = (of_untouched.values[*i], of_untouched.steps[*i]);
         }
         let together = self.without_drift(repeats, usize::MAX);
-        let far_off = [apart, together].map(|driftless| self.far_off(&driftless, repeats));
+        let far_off = [apart, together].map(|driftless| self.outlier_warning(&driftless, repeats));
         far_off.into_iter().min_by_key(|warning| warning.as_ref().map_or(0, Warning::extent)).flatten()
     }
 
-    fn far_off(&self, driftless: &Driftless, repeats: &[Vec<usize>]) -> Option<Warning> {
+    fn outlier_warning(&self, driftless: &Driftless, repeats: &[Vec<usize>]) -> Option<Warning> {
         let Driftless { values, steps: drift_steps } = driftless;
         // Equal repeats of a slow or coarse channel do not show the scatter.
         let pairs = repeats.iter().flat_map(|rows| rows.windows(2));
@@ -421,7 +422,7 @@ pub(crate) fn channel_list(channels: &[impl AsRef<str>]) -> String {
 
 impl fmt::Display for Repeats {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { left_out, of, sample_and_hold, .. } = self;
+        let Self { removed: left_out, of, sample_and_hold, .. } = self;
         let cause = if *sample_and_hold {
             "the logger is faster than its sensors"
         } else {

@@ -32,7 +32,7 @@ impl Recording {
     ///
     /// # Errors
     /// [`NoUntouchedRow`].
-    pub fn zeroed(mut self, zero: Zero) -> Result<Self, NoUntouchedRow> {
+    pub fn subtract_zero(mut self, zero: Zero) -> Result<Self, NoUntouchedRow> {
         match zero {
             Zero::None => return Ok(self),
             Zero::Last => {}
@@ -75,7 +75,7 @@ mod tests {
     }
 
     fn zeroed(rows: &[(Option<f64>, f64, f64)]) -> Vec<f64> {
-        recording(rows).zeroed(Zero::Last).unwrap().rows.iter().map(|row| row.reading[0]).collect()
+        recording(rows).subtract_zero(Zero::Last).unwrap().rows.iter().map(|row| row.reading[0]).collect()
     }
 
     #[test]
@@ -95,7 +95,7 @@ mod tests {
     #[test]
     fn keeps_or_refuses_a_recording_without_untouched_rows() {
         let touched = recording(&[(None, 1.0, 11.0)]);
-        assert_eq!(touched.clone().zeroed(Zero::None), Ok(touched.clone()));
-        assert_eq!(touched.zeroed(Zero::Last), Err(NoUntouchedRow));
+        assert_eq!(touched.clone().subtract_zero(Zero::None), Ok(touched.clone()));
+        assert_eq!(touched.subtract_zero(Zero::Last), Err(NoUntouchedRow));
     }
 }

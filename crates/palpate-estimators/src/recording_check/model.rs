@@ -155,7 +155,7 @@ impl MeanReadings {
             }
             let new = self.fits(&self.modelled(model, place));
             let before = best.as_ref().map_or(fits, |(_, fits)| fits);
-            let improves = if best.is_some() { unexplained(&new) < unexplained(before) } else { true };
+            let improves = if best.is_some() { residual_share(&new) < residual_share(before) } else { true };
             if improves && self.is_better(&new, fits) {
                 best = Some((candidate, new));
             }
@@ -186,7 +186,7 @@ impl MeanReadings {
     }
 }
 
-fn unexplained(fits: &[ChannelFit]) -> f64 {
+fn residual_share(fits: &[ChannelFit]) -> f64 {
     mean(fits.iter().map(|fit| fit.unexplained))
 }
 

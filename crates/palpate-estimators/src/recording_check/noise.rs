@@ -14,7 +14,7 @@ pub fn compare(setup: &Setup, recording: &Recording) -> Vec<Mismatch> {
     let sensors = setup.layout().sensors();
     let repeats = recording.repeats();
     let live: Vec<usize> = (0..sensors.len().min(recording.channels.len()))
-        .filter(|c| !sensors[*c].channel.dead && sensors[*c].channel.noise_sd > 0.0)
+        .filter(|c| !sensors[*c].channel.disabled && sensors[*c].channel.noise_sd > 0.0)
         .collect();
     let ratios = live.iter().filter_map(|c| {
         let sd = sensors[*c].channel.reading_sd();

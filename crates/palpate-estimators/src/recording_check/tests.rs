@@ -101,7 +101,7 @@ fn every_mismatch_is_one_line_with_a_remedy() {
 }
 
 #[test]
-fn repeats_are_held_against_the_noise_by_a_chi_squared_test() {
+fn repeats_are_compared_with_the_noise_by_a_chi_squared_test() {
     let (setup, _) = paper();
     let noisy = |noise_m: f64, repeats: usize, seed: u64| {
         let bench =

@@ -5,7 +5,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::faulty_channels::FaultyChannels;
 use super::{CleanSensors, SimulateError};
-use crate::imperfections::{BenchState, ImperfectChannels, Imperfections, StandardNoise, spread_contact};
+use crate::imperfections::{BenchState, ImperfectChannels, Imperfections, StandardNoise, distribute_contact};
 use crate::setup::Setup;
 use palpate_mechanics::contact::{Contact, Extent, Position};
 use palpate_numerics::watch::Watch;
@@ -113,7 +113,7 @@ impl<'a> SimulatedBench<'a> {
     /// Returns the faultless reading under the soft layer.
     pub fn clean_through_layer(&self, contacts: &[Contact]) -> Vec<f64> {
         let width_m = self.imperfections().map_or(0.0, |imperfections| imperfections.touch_width_m);
-        let points = contacts.iter().flat_map(|contact| spread_contact(*contact, width_m, self.extent));
+        let points = contacts.iter().flat_map(|contact| distribute_contact(*contact, width_m, self.extent));
         self.clean(&points.collect::<Vec<_>>())
     }
 

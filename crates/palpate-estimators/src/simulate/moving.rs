@@ -1,7 +1,7 @@
 //! Simulated moving contacts.
 
 use super::{CleanSensors, READINGS_EACH, STAGE, SimulateError, SimulatedBench};
-use crate::imperfections::spread_contact;
+use crate::imperfections::distribute_contact;
 use crate::recording::{Recording, Row, TimedRecording};
 use crate::setup::Setup;
 use palpate_mechanics::contact::Contact;
@@ -106,8 +106,8 @@ pub fn simulate_moving_watched(
     let repeats = setup.imperfections().map_or(0, |imperfections| imperfections.repeated_readings as usize);
     let points_at = |time_s: f64| points_of(setup, &moving.contacts_at(time_s, force_n));
     let mut under = match moving.beam {
-        Some(beam) => Under::Swings(beam.at_rest(MODES, &points_at(0.0))),
-        None => Under::Balances(CleanSensors::new_watched(surface, layout, watch)?),
+        Some(beam) => SurfaceResponse::Swings(beam.at_rest(MODES, &points_at(0.0))),
+        None => SurfaceResponse::Balances(CleanSensors::new_watched(surface, layout, watch)?),
     };
     let (mut rows, mut second) = (Vec::<Row>::with_capacity(count), Vec::new());
     for (i, time_s) in times_s.iter().enumerate() {
@@ -115,7 +115,7 @@ pub fn simulate_moving_watched(
             watch.counted(STAGE, "readings", i, count)?;
         }
         let contacts = moving.contacts_at(*time_s, force_n);
-        if let (Under::Swings(response), Some(before)) = (&mut under, i.checked_sub(1)) {
+        if let (SurfaceResponse::Swings(response), Some(before)) = (&mut under, i.checked_sub(1)) {
             advance(response, moving, &points_at, (times_s[before], *time_s));
         }
         let clean = under.reading(layout, &points_at(*time_s));
@@ -132,16 +132,16 @@ pub fn simulate_moving_watched(
 
 fn points_of(setup: &Setup, contacts: &[Contact]) -> Vec<Contact> {
     let width_m = setup.imperfections().map_or(0.0, |imperfections| imperfections.touch_width_m);
-    let spread = |contact: &Contact| spread_contact(*contact, width_m, setup.surface().extent());
+    let spread = |contact: &Contact| distribute_contact(*contact, width_m, setup.surface().extent());
     contacts.iter().flat_map(spread).collect()
 }
 
-enum Under<'a> {
+enum SurfaceResponse<'a> {
     Swings(ModalResponse),
     Balances(CleanSensors<'a>),
 }
 
-impl Under<'_> {
+impl SurfaceResponse<'_> {
     /// A vibrating beam has been advanced to the contacts.
     fn reading(&self, layout: &Layout, contacts: &[Contact]) -> Vec<f64> {
         match self {

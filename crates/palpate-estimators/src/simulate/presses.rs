@@ -85,7 +85,7 @@ impl<'a> PressedBench<'a> {
         for (i, Press { contact, rows: count }) in presses.iter().enumerate() {
             watch.counted(STAGE, "presses", i, presses.len())?;
             self.rest(contact.position, &mut rows);
-            let position = self.pressed_place(contact.position, placement_sd_m, extent);
+            let position = self.place_with_error(contact.position, placement_sd_m, extent);
             let clean = self.bench.clean_through_layer(&[Contact { position, ..*contact }]);
             let settle_s = self.imperfections.schedule.settle_s;
             self.record_window(*contact, &clean, settle_s, *count, &mut rows);
@@ -136,7 +136,7 @@ impl<'a> PressedBench<'a> {
         }
     }
 
-    fn pressed_place(&mut self, asked: Position, sd_m: Option<f64>, extent: Extent) -> Position {
+    fn place_with_error(&mut self, asked: Position, sd_m: Option<f64>, extent: Extent) -> Position {
         let Some(sd_m) = sd_m else { return asked };
         let mut beside = |at_m: f64, side_m: f64| {
             let error: f64 = self.places.sample(StandardNormal);

@@ -54,7 +54,7 @@ fn a_simulation_survives_its_file_bit_for_bit() {
 }
 
 #[test]
-fn what_a_moving_contact_reads_does_not_depend_on_how_often_it_is_asked() {
+fn readings_of_a_moving_contact_do_not_depend_on_the_sampling_rate() {
     let setup = paper(0.0, 1).setup;
     let along =
         |from, to, speed, turn| Motion::new(Position::along(from), Position::along(to), speed, turn).unwrap();
@@ -91,7 +91,7 @@ fn what_a_moving_contact_reads_does_not_depend_on_how_often_it_is_asked() {
 }
 
 #[test]
-fn what_cannot_be_simulated_is_refused_with_the_reason() {
+fn invalid_simulation_is_refused_with_the_reason() {
     let measured = strip();
     let mut no_force = paper(5e-6, 1);
     no_force.setup = no_force.setup.unknown_force();
@@ -133,7 +133,7 @@ fn sensors_sit_beside_their_places_by_no_more_than_they_may() {
 }
 
 #[test]
-fn simulations_stop_at_any_look_and_are_otherwise_the_same() {
+fn simulations_stop_at_any_check_and_repeat_equally() {
     let plate = plate(6, ChannelModel { noise_sd: 1e-6, position_error_m: 1e-3, ..ChannelModel::default() });
     for Example { setup, training } in [noisy(), plate] {
         let (made, _) =
@@ -261,7 +261,7 @@ fn calibration_and_use_are_one_bench_that_goes_on() {
     let split = calibration.simulate(3).unwrap();
     assert_eq!(split.training, example.simulate(3));
     let [end_s, start_s] =
-        [split.training.rows.last(), split.judged.rows.first()].map(|row| row.unwrap().time_s.unwrap());
+        [split.training.rows.last(), split.held_out.rows.first()].map(|row| row.unwrap().time_s.unwrap());
     assert!((start_s - end_s - 606.0).abs() < 1e-9, "{start_s} {end_s}");
     // Evaluations continue from equal offsets too, with other walks.
     let contacts = [Contact { position: Position::along(0.1), force_n: 3.0 }];
@@ -275,7 +275,7 @@ fn calibration_and_use_are_one_bench_that_goes_on() {
         let drifted = used.rows[0].reading[c] - left.play - left.walk - 1e-5 * (start_s - 2.0) * range;
         assert!(drifted.abs() < 4.0 * walk_sd * range, "channel {c}: {drifted} {range}");
     }
-    assert_ne!(used.rows[0].reading, split.judged.rows[0].reading);
+    assert_ne!(used.rows[0].reading, split.held_out.rows[0].reading);
     assert_eq!(used.rows.iter().filter(|row| row.touches()).count(), 1);
 }
 

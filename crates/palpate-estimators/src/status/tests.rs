@@ -26,8 +26,8 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 #[test]
 fn the_bound_is_the_quantile_of_chi_squared() {
     // For two degrees of freedom P(χ² > b) = e^(−b/2).
-    assert!((misfit_bound(2) + 2.0 * OUTSIDE_MODEL_RATE.ln()).abs() < 1e-6);
-    assert_eq!(misfit_bound(0), misfit_bound(1));
+    assert!((chi_squared_bound(2) + 2.0 * OUTSIDE_MODEL_RATE.ln()).abs() < 1e-6);
+    assert_eq!(chi_squared_bound(0), chi_squared_bound(1));
 }
 
 #[test]
@@ -42,7 +42,7 @@ fn learnt_bounds_see_every_place_of_a_recording_that_repeats_itself() {
         reading: vec![off_at_one(i)],
     });
     let recording = raw_recording(rows.collect());
-    assert_eq!(learnt_bounds([10.0, 100.0], &recording, |reading| [reading[0]; 2]), [60.0, 100.0]);
+    assert_eq!(recording_bounds([10.0, 100.0], &recording, |reading| [reading[0]; 2]), [60.0, 100.0]);
 }
 
 /// Estimator with known noise on a setup.
@@ -101,7 +101,7 @@ fn false_alarms(case: &Case, setup: &Setup) -> FalseAlarms {
     let bound = noise_bound(setup.layout().len(), FalseAlarmRate::DEFAULT);
     let silence = vec![0.0; setup.layout().len()];
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(0);
-    let force_n = case.bench.pressed_setup().force_n().unwrap();
+    let force_n = case.bench.training_setup().force_n().unwrap();
     let mut alarms = FalseAlarms::default();
     for _ in 0..case.readings {
         let noise = measure(setup.layout(), &silence, &errors, &mut rng);
@@ -203,11 +203,11 @@ fn check(case: &Case, force_n: Option<f64>) -> String {
 
 /// Printed with --nocapture.
 #[test]
-fn false_alarms_are_as_rare_as_the_rule_says() {
+fn false_alarm_rate_equals_that_of_the_rule() {
     let cases = cases();
     let rows: Vec<String> = std::thread::scope(|scope| {
         let checks = cases.iter().flat_map(|case| {
-            [case.bench.pressed_setup().force_n(), None]
+            [case.bench.training_setup().force_n(), None]
                 .map(|force_n| scope.spawn(move || check(case, force_n)))
         });
         let running: Vec<_> = checks.collect();
@@ -348,7 +348,7 @@ fn as_many_readings_as_unknowns_can_be_outside_the_model() {
 }
 
 /// Counts contacts that are `located` or `ambiguous`, and those of them with the whole surface as interval.
-fn left_open(locator: &Locator, bench: &Example, force_n: f64, contacts: usize) -> [usize; 2] {
+fn undetermined_counts(locator: &Locator, bench: &Example, force_n: f64, contacts: usize) -> [usize; 2] {
     let (layout, extent) = (bench.setup.layout(), bench.setup.surface().extent());
     let clean = CleanSensors::new(bench.setup.surface().model().unwrap(), layout);
     let errors = ChannelErrors::none(layout);
@@ -381,7 +381,7 @@ fn left_open(locator: &Locator, bench: &Example, force_n: f64, contacts: usize) 
 
 /// Printed with --nocapture.
 #[test]
-fn nothing_is_located_whose_interval_is_the_surface() {
+fn undetermined_contacts_are_not_located() {
     const CONTACTS: usize = 2_000;
     let plate = plate(24, ChannelModel { noise_sd: 5e-6, ..ChannelModel::default() });
     println!("| bench | force | told | of these with the place left open |\n|---|---|---|---|");
@@ -392,7 +392,7 @@ fn nothing_is_located_whose_interval_is_the_surface() {
             let locator = estimator.fit_without_interval_check(FitTask::new(&setup, &presses)).unwrap();
             let kind = locator.kind();
             for force_n in forces_n {
-                let [told, open] = left_open(&locator, &bench, force_n, CONTACTS);
+                let [told, open] = undetermined_counts(&locator, &bench, force_n, CONTACTS);
                 let percent = 100.0 * open as f64 / told as f64;
                 println!("| {name}, {kind} | {force_n} N | {told} of {CONTACTS} | {percent:.2} % |");
                 // There are a few such contacts, near ends and edges.
@@ -403,12 +403,12 @@ fn nothing_is_located_whose_interval_is_the_surface() {
 }
 
 #[test]
-fn an_interval_of_a_whole_side_alone_tells_the_other_coordinate() {
+fn interval_of_a_whole_side_leaves_the_other_coordinate_determined() {
     let plane = Extent::plane(0.3, 0.2).unwrap();
     let of = |x_95_m, y_95_m, status| {
         let uncertainty = Uncertainty { x_95_m, y_95_m, ..Uncertainty::default() };
         let contact = ContactEstimate { uncertainty: Some(uncertainty), ..ContactEstimate::default() };
-        unless_left_open(Estimate::of_contact(contact, status), plane).status
+        mark_undetermined(Estimate::of_contact(contact, status), plane).status
     };
     let (whole_x, whole_y) = ((0.0, 0.29), (-0.1, 0.195));
     assert_eq!(of(whole_x, whole_y, Status::Located), Status::Ambiguous);
@@ -420,5 +420,5 @@ fn an_interval_of_a_whole_side_alone_tells_the_other_coordinate() {
         assert_eq!(of(whole_x, whole_y, status), status);
     }
     let unknown = Estimate::of_position(Position::along(0.1), Status::Located);
-    assert_eq!(unless_left_open(unknown, plane).status, Status::Located);
+    assert_eq!(mark_undetermined(unknown, plane).status, Status::Located);
 }

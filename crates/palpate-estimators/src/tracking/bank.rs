@@ -75,7 +75,7 @@ impl<const N: usize, const M: usize> Bank<N, M> {
             let places = (0..K).filter(|k| observed.is_place[*k]);
             let moved = places.map(|k| fit.information[k][k] * (next[k] - about[k]).powi(2));
             if moved.sum::<f64>() < 0.1 || round == MOST_ROUNDS {
-                return Some((after.held(observed), evidence));
+                return Some((after.clamp_members(observed), evidence));
             }
             (about, round) = (next, round + 1);
         }
@@ -157,7 +157,7 @@ impl<const N: usize, const M: usize> Bank<N, M> {
                 .zip(observed.entries)
                 .for_each(|(mean, entry)| *mean += share * member.mean[entry]);
         }
-        std::array::from_fn(|k| observed.held(k, mean[k]))
+        std::array::from_fn(|k| observed.clamp(k, mean[k]))
     }
 
     /// `None` on underflow.
@@ -181,10 +181,10 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         (best.is_finite() && sum > 0.0).then(|| (after, best + sum.ln()))
     }
 
-    fn held<const K: usize>(mut self, observed: &ObservedEntries<K>) -> Self {
+    fn clamp_members<const K: usize>(mut self, observed: &ObservedEntries<K>) -> Self {
         for member in &mut self.members {
             for (k, entry) in observed.entries.into_iter().enumerate() {
-                member.mean[entry] = observed.held(k, member.mean[entry]);
+                member.mean[entry] = observed.clamp(k, member.mean[entry]);
             }
         }
         self
@@ -215,7 +215,7 @@ impl<const K: usize> ObservedEntries<K> {
         self.entries.into_iter().enumerate().map(of_entry).sum()
     }
 
-    fn held(&self, k: usize, value: f64) -> f64 {
+    fn clamp(&self, k: usize, value: f64) -> f64 {
         let (least, most) = self.bounds[k];
         value.max(least).min(most)
     }

@@ -38,7 +38,7 @@ pub(super) struct Moments {
 }
 
 impl Belief {
-    pub fn nothing() -> Self {
+    pub fn no_contact() -> Self {
         Self::Nothing(Bank::uniform(Gaussian::default()))
     }
 
@@ -74,7 +74,7 @@ impl Belief {
         match (self, observation.likelihood.geometry()) {
             (Self::Nothing(bank), _) => {
                 let expand =
-                    |about: &[f64; 1]| observation.likelihood.fit_nothing(observation.whitened, about[0]);
+                    |about: &[f64; 1]| observation.likelihood.fit_untouched(observation.whitened, about[0]);
                 let updated = bank.updated(&observation.entries_on_line(), expand, None);
                 updated.map(|(bank, evidence)| (Self::Nothing(bank), evidence))
             }
@@ -110,7 +110,7 @@ impl Belief {
             Self::Nothing(_) => None,
             Self::One(bank) => Some(Self::Nothing(bank.without_contact(k))),
             Self::Two(bank) => Some(Self::One(bank.without_contact(k))),
-            Self::OnPlane(_) => Some(Self::nothing()),
+            Self::OnPlane(_) => Some(Self::no_contact()),
         }
     }
 

@@ -30,7 +30,7 @@ impl<const N: usize> Transition<N> {
     }
 
     /// F·P.
-    fn carried(&self, p: &Matrix<N>) -> Matrix<N> {
+    fn transition_product(&self, p: &Matrix<N>) -> Matrix<N> {
         let mut carried = [[0.0; N]; N];
         for (row, forward) in carried.iter_mut().zip(&self.forward) {
             for (share, from) in forward.iter().zip(p).filter(|(share, _)| **share != 0.0) {
@@ -49,7 +49,7 @@ impl<const N: usize> Default for Gaussian<N> {
 
 impl<const N: usize> Gaussian<N> {
     pub fn predicted(&self, transition: &Transition<N>) -> Self {
-        let carried = transition.carried(&self.covariance);
+        let carried = transition.transition_product(&self.covariance);
         let mut covariance = transition.noise;
         for (row, carried) in covariance.iter_mut().zip(&carried) {
             for (value, forward) in row.iter_mut().zip(&transition.forward) {
@@ -118,7 +118,7 @@ impl<const N: usize> Gaussian<N> {
     /// stay.
     pub fn smoothed(&self, transition: &Transition<N>, later: &Self) -> Self {
         let expected = self.predicted(transition);
-        let carried = transition.carried(&self.covariance);
+        let carried = transition.transition_product(&self.covariance);
         let factors = Ldl::semidefinite(&expected.covariance);
         let gain: Matrix<N> = std::array::from_fn(|i| factors.solve(std::array::from_fn(|j| carried[j][i])));
         let mut before = *self;
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_later_and_tells_nothing_new_changes_nothing() {
+    fn later_readings_without_information_leave_the_state() {
         for known in [false, true] {
             let mut belief = BELIEF;
             let mut noise = [[0.0; 3]; 3];

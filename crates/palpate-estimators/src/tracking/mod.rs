@@ -91,14 +91,14 @@ pub struct Track {
     /// Probabilities of no, one and two contacts.
     pub numbers: [f64; 3],
     /// Contacts in persistent order.
-    pub contacts: Vec<Tracked>,
+    pub contacts: Vec<TrackedContact>,
     /// Single estimate.
     pub single: Estimate,
 }
 
 /// Tracked contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tracked {
+pub struct TrackedContact {
     /// Position in metres.
     pub x_m: f64,
     /// Speed in m/s.
@@ -112,12 +112,12 @@ pub struct Tracked {
     /// 95 % interval of a log-normal force, by force–position trade-off; `None` if normal.
     pub force_95_n: Option<(f64, f64)>,
     /// Motion across a plane.
-    pub across: Option<Across>,
+    pub transverse: Option<TransverseMotion>,
 }
 
 /// Motion across a plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Across {
+pub struct TransverseMotion {
     /// Position in metres.
     pub y_m: f64,
     /// Speed in m/s.
@@ -150,11 +150,11 @@ impl Track {
     }
 }
 
-impl Tracked {
+impl TrackedContact {
     /// The contact as an estimate, without covariance of position and force.
     pub fn estimate(&self) -> ContactEstimate {
         let [sd_m, _, sd_n] = self.sd;
-        let (y_m, y_95_m, xy, yy) = self.across.map_or((0.0, (0.0, 0.0), 0.0, 0.0), |across| {
+        let (y_m, y_95_m, xy, yy) = self.transverse.map_or((0.0, (0.0, 0.0), 0.0, 0.0), |across| {
             (across.y_m, across.y_95_m, across.covariance_m2, across.sd[0].powi(2))
         });
         let covariance = [sd_m * sd_m, xy, 0.0, yy, 0.0, sd_n * sd_n];
@@ -183,7 +183,7 @@ impl Tracked {
             return Self::from_belief(best, likelihood);
         };
         let extent @ Extent::Line { .. } = likelihood.extent() else {
-            return Self::from_belief(&[spread(first, beliefs, sum)], likelihood);
+            return Self::from_belief(&[mixture_moments(first, beliefs, sum)], likelihood);
         };
         let mut all = Self::from_belief(best, likelihood);
         if let [one] = all.as_mut_slice() {
@@ -208,7 +208,7 @@ impl Tracked {
             let sd = [(along + xx).sqrt(), speed.sqrt(), (force + left.force_n2).sqrt()];
             let across = |width_m: f64| {
                 let sd = [(across + yy).sqrt(), across_speed.sqrt()];
-                Across {
+                TransverseMotion {
                     y_m,
                     speed_m_per_s: speed_across,
                     sd,
@@ -218,13 +218,21 @@ impl Tracked {
             };
             let x_95_m = clamped_interval(normal_interval_95(x_m, sd[0]), extent.length_m());
             let force_95_n = force_interval_n(force_n, sd[2], left.force_n2 > force, greatest_n);
-            Self { x_m, speed_m_per_s, force_n, sd, x_95_m, force_95_n, across: extent.width_m().map(across) }
+            Self {
+                x_m,
+                speed_m_per_s,
+                force_n,
+                sd,
+                x_95_m,
+                force_95_n,
+                transverse: extent.width_m().map(across),
+            }
         };
         belief.iter().zip(left).map(tracked).collect()
     }
 }
 
-impl Tracked {
+impl TrackedContact {
     /// As the locator's interval check.
     fn widen_by_check(tracked: &mut [Self], likelihood: &dyn Likelihood) {
         let Some(check) = likelihood.interval_check() else { return };
@@ -232,7 +240,7 @@ impl Tracked {
         let greatest_n = likelihood.force_range().map_or(f64::INFINITY, |range| range.ends_n().1);
         for one in tracked {
             let [sd_m, _, sd_n] = one.sd;
-            let (yy, xy) = one.across.map_or((0.0, 0.0), |across| {
+            let (yy, xy) = one.transverse.map_or((0.0, 0.0), |across| {
                 let more = position.factor * position.factor - 1.0;
                 (position.added_variance(across.sd[0].powi(2)), more * across.covariance_m2)
             });
@@ -258,7 +266,7 @@ impl Tracked {
         self.sd[0] = at_most(self.sd[0].powi(2) + xx, extent.length_m());
         self.sd[2] = at_most(self.sd[2].powi(2) + force, greatest_n);
         self.force_95_n = force_interval_n(self.force_n, self.sd[2], self.force_95_n.is_some(), greatest_n);
-        if let (Some(across), Some(width_m)) = (&mut self.across, extent.width_m()) {
+        if let (Some(across), Some(width_m)) = (&mut self.transverse, extent.width_m()) {
             across.y_95_m = wider(across.y_m, across.y_95_m, yy, width_m);
             across.sd[0] = at_most(across.sd[0].powi(2) + yy, width_m);
             across.covariance_m2 += xy;
@@ -278,7 +286,7 @@ fn force_interval_n(force_n: f64, sd_n: f64, trades_off: bool, greatest_n: f64) 
 }
 
 /// Covariance of all hypotheses about the most probable contact.
-fn spread(best: &Moments, beliefs: &[(f64, Vec<Moments>)], sum: f64) -> Moments {
+fn mixture_moments(best: &Moments, beliefs: &[(f64, Vec<Moments>)], sum: f64) -> Moments {
     let mut spread = Moments { variance: [0.0; 5], covariance_m2: 0.0, ..*best };
     for (weight, one) in beliefs.iter().filter_map(|(weight, contacts)| Some((weight, contacts.first()?))) {
         let (share, off) = (weight / sum, |i: usize| one.mean[i] - best.mean[i]);

@@ -18,7 +18,7 @@
 //! Nine filters, three walks w times three rates r, are weighted by untouched readings (D. T. Magill, IEEE
 //! Trans. Autom. Control 10, 1965).
 
-use super::Tracked;
+use super::TrackedContact;
 use crate::likelihood::{Likelihood, Linearisation};
 use crate::untouched_drift::UntouchedDrift;
 use ndarray::{Array1, Array2, s};
@@ -153,7 +153,7 @@ impl SlowState {
     }
 
     /// Corrects a reading and its whitened values.
-    pub fn take_off(
+    pub fn subtract(
         &mut self,
         time_s: f64,
         duration_s: Option<f64>,
@@ -183,7 +183,7 @@ impl SlowState {
         &mut self,
         likelihood: &dyn Likelihood,
         whitened: &[f64],
-        contacts: &[Tracked],
+        contacts: &[TrackedContact],
         probability: f64,
     ) {
         let Some(drift) = &mut self.drift else { return };
@@ -251,8 +251,8 @@ fn noise(likelihood: &dyn Likelihood, channels: usize) -> Vec<(usize, f64)> {
     noise
 }
 
-fn contact_of(tracked: &Tracked) -> Contact {
-    let y_m = tracked.across.map_or(0.0, |across| across.y_m);
+fn contact_of(tracked: &TrackedContact) -> Contact {
+    let y_m = tracked.transverse.map_or(0.0, |across| across.y_m);
     Contact { position: Position { x_m: tracked.x_m, y_m }, force_n: tracked.force_n }
 }
 
@@ -371,7 +371,7 @@ impl DriftFilter {
 }
 
 /// Adds the uncertainty by drift.
-pub(super) fn widen(covariance: &Array2<f64>, likelihood: &dyn Likelihood, tracked: &mut [Tracked]) {
+pub(super) fn widen(covariance: &Array2<f64>, likelihood: &dyn Likelihood, tracked: &mut [TrackedContact]) {
     let contacts: Vec<Contact> = tracked.iter().map(contact_of).collect();
     let greatest_n = likelihood.force_range().map_or(f64::INFINITY, |range| range.ends_n().1);
     let added = covariance_of_contacts(covariance, &likelihood.linearised(&contacts));
@@ -510,7 +510,7 @@ mod tests {
     #[test]
     fn a_line_is_found_by_its_rate_and_carried_on() {
         let mut filter = DriftFilter::new(Drift::default(), &[1.0; 3]);
-        let likelihood = Nothing(3);
+        let likelihood = SilentModel(3);
         let mut offset = [0.0; 3];
         for i in 0..600_u32 {
             let time_s = 0.2 * f64::from(i);
@@ -537,9 +537,9 @@ mod tests {
     }
 
     #[test]
-    fn what_creeps_is_given_back_fresh() {
+    fn creep_is_subtracted() {
         let creep = Creep { share: 0.08, time_s: 4.0 };
-        let mut state = SlowState::new(&Nothing(2), 2, None, Some(creep));
+        let mut state = SlowState::new(&SilentModel(2), 2, None, Some(creep));
         let (mut z, every_s) = ([0.0; 2], 0.05);
         for i in 0..2000_u32 {
             let fresh = if (i / 400) % 2 == 1 { [30.0, -4.0] } else { [0.0; 2] };
@@ -550,16 +550,16 @@ mod tests {
                 fresh[c] + creep.share * z[c]
             });
             let mut whitened = reading;
-            state.take_off(f64::from(i) * every_s, (i > 0).then_some(every_s), &mut whitened, &mut reading);
+            state.subtract(f64::from(i) * every_s, (i > 0).then_some(every_s), &mut whitened, &mut reading);
             for c in 0..2 {
                 assert!((whitened[c] - fresh[c]).abs() < 1e-9 && (reading[c] - fresh[c]).abs() < 1e-9, "{i}");
             }
         }
     }
 
-    struct Nothing(usize);
+    struct SilentModel(usize);
 
-    impl Likelihood for Nothing {
+    impl Likelihood for SilentModel {
         fn geometry(&self) -> crate::likelihood::Geometry<'_> {
             unreachable!("no tracker asks")
         }
@@ -569,7 +569,7 @@ mod tests {
             whitened.extend(reading);
         }
 
-        fn fit_nothing(&self, _: &[f64], _: f64) -> crate::likelihood::ContactFit<1> {
+        fn fit_untouched(&self, _: &[f64], _: f64) -> crate::likelihood::ContactFit<1> {
             unreachable!("no tracker asks")
         }
 

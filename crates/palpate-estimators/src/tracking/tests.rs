@@ -60,7 +60,7 @@ pub(super) fn wrongly_touching(likelihood: impl Likelihood + 'static, readings: 
     let mut tracker = Tracker::new(Arc::new(likelihood), TrackerConfig::default());
     let mut wrong = 0;
     for (time_s, truth, reading) in readings {
-        let track = tracker.follow(*time_s, reading).unwrap();
+        let track = tracker.update(*time_s, reading).unwrap();
         let touching = !track.contacts.is_empty();
         assert_eq!(touching, track.touching() > 0.5);
         wrong += usize::from(touching != (truth.force_n > 0.0));
@@ -82,7 +82,7 @@ pub(super) fn assert_closer_than_readings(
     let likelihood: Arc<dyn Likelihood> = Arc::new(likelihood);
     let mut tracker = SmoothTracker::new(Arc::clone(&likelihood), TrackerConfig::default());
     for (time_s, _, reading) in readings {
-        tracker.follow(*time_s, reading).unwrap();
+        tracker.update(*time_s, reading).unwrap();
     }
     let truths: Vec<Vec<Contact>> = readings.iter().map(|(_, truth, _)| vec![*truth]).collect();
     let errors = |tracks: &[Track]| TrackErrors::new(tracks, &truths, likelihood.extent()).unwrap();
@@ -104,12 +104,12 @@ fn a_track_is_several_times_closer_than_its_readings() {
 }
 
 #[test]
-fn smoothing_stops_when_it_is_told_to() {
+fn smoothing_stops_on_request() {
     let rig = rig();
     let likelihood = likelihood(&rig, Some(3.0));
     let mut tracker = SmoothTracker::new(Arc::new(likelihood), TrackerConfig::default());
     for (time_s, _, reading) in readings(&rig, along_the_beam(), 2).iter().take(200) {
-        tracker.follow(*time_s, reading).unwrap();
+        tracker.update(*time_s, reading).unwrap();
     }
     assert_eq!(tracker.smoothed(Watch::NONE).unwrap().len(), 200);
     let most = AtomicUsize::new(0);
@@ -212,7 +212,7 @@ fn two_contacts_are_followed_while_one_lets_go_and_comes_down_again() {
     let (mut wrong, mut all) = (0, 0);
     let (mut tracked, mut alone) = (Vec::new(), Vec::new());
     for (time_s, truths, reading) in two_readings(&rig, motions, 3) {
-        let track = tracker.follow(time_s, &reading).unwrap();
+        let track = tracker.update(time_s, &reading).unwrap();
         let touching: Vec<f64> =
             truths.iter().filter(|truth| truth.force_n > 0.0).map(|truth| truth.position.x_m).collect();
         all += 1;
@@ -236,7 +236,7 @@ fn off_m(touching: &[f64], mut found: Vec<f64>) -> Vec<f64> {
 }
 
 #[test]
-fn readings_out_of_order_are_refused_and_change_nothing() {
+fn readings_out_of_order_are_refused_without_effect() {
     let rig = rig();
     let likelihood: Arc<dyn Likelihood> = Arc::new(likelihood(&rig, Some(3.0)));
     let surface = rig.setup.surface().model().unwrap();
@@ -247,14 +247,14 @@ fn readings_out_of_order_are_refused_and_change_nothing() {
         Tracker::new(likelihood, TrackerConfig::default()),
     );
     for tracker in [&mut one, &mut other] {
-        tracker.follow(1.0, &reading).unwrap();
+        tracker.update(1.0, &reading).unwrap();
     }
     for time_s in [1.0, 0.5, f64::NAN] {
-        assert!(one.follow(time_s, &reading).is_err());
+        assert!(one.update(time_s, &reading).is_err());
     }
-    let told = one.follow(0.5, &reading).unwrap_err().to_string();
+    let told = one.update(0.5, &reading).unwrap_err().to_string();
     assert_eq!(told, "the reading is of 0.5 s; it must be later than the previous one, of 1 s");
-    assert_eq!(one.follow(2.0, &reading), other.follow(2.0, &reading));
+    assert_eq!(one.update(2.0, &reading), other.update(2.0, &reading));
 }
 
 #[test]
@@ -275,7 +275,7 @@ pub(super) fn assert_numbers_after_absurd_readings<const C: usize>(
     let likelihood: Arc<dyn Likelihood> = Arc::new(likelihood);
     let mut tracker = Tracker::new(Arc::clone(&likelihood), TrackerConfig::default());
     for (i, reading) in absurd.iter().chain(&absurd).enumerate() {
-        let track = tracker.follow(10f64.powi(i as i32), reading).unwrap();
+        let track = tracker.update(10f64.powi(i as i32), reading).unwrap();
         assert!(track.touching().is_finite());
         for tracked in track.contacts {
             assert!(likelihood.extent().contains(tracked.estimate().position), "{tracked:?}");
@@ -331,7 +331,7 @@ fn a_baseline_that_moves_moves_no_contact() {
         moving.move_baseline(&by);
         let tared: Vec<f64> = reading.iter().zip(&moved).map(|(reading, moved)| reading - moved).collect();
         let (still, moving) =
-            (still.follow(*time_s, reading).unwrap(), moving.follow(*time_s, &tared).unwrap());
+            (still.update(*time_s, reading).unwrap(), moving.update(*time_s, &tared).unwrap());
         assert_eq!(still.contacts.len(), moving.contacts.len(), "{i}");
         for (still, moving) in still.contacts.iter().zip(&moving.contacts) {
             assert!((still.x_m - moving.x_m).abs() < 1e-7, "{i}: {} {}", still.x_m, moving.x_m);
@@ -349,7 +349,7 @@ fn a_new_baseline_restarts_creep_without_a_drift() {
     let mut slow = SlowState::new(&likelihood, noise.len(), None, Some(creep));
     let corrected = |slow: &mut SlowState, time_s: f64, size: f64| {
         let (mut whitened, mut reading) = (vec![size; noise.len()], vec![0.0; noise.len()]);
-        slow.take_off(time_s, Some(1.0), &mut whitened, &mut reading);
+        slow.subtract(time_s, Some(1.0), &mut whitened, &mut reading);
         whitened
     };
     for second in 0..60 {
@@ -366,7 +366,7 @@ fn a_new_baseline_restarts_creep_without_a_drift() {
 /// Beside an end, force and position of a constant contact trade off; they stay within the calibration's
 /// uncertainty.
 #[test]
-fn the_force_of_a_held_contact_is_within_what_calibration_leaves() {
+fn force_error_of_a_constant_contact_is_within_the_calibration_variance() {
     let mut rig = crate::fixtures::paper(5e-6, 10);
     rig.training = rig.training.with_force(3.0);
     let setup = rig.setup.clone().unknown_force();
@@ -386,7 +386,7 @@ fn the_force_of_a_held_contact_is_within_what_calibration_leaves() {
             let mut found = None;
             for i in 0..200 {
                 let reading = measure(setup.layout(), &clean, &errors, &mut rng);
-                found = tracker.follow(f64::from(i) * 0.01, &reading).unwrap().contacts.first().copied();
+                found = tracker.update(f64::from(i) * 0.01, &reading).unwrap().contacts.first().copied();
             }
             let Some(tracked) = found else { continue };
             place += usize::from((tracked.x_95_m.0..=tracked.x_95_m.1).contains(&x_m));
@@ -439,7 +439,7 @@ fn contacts_end_within_the_residue_of_untouched_rows() {
             for (clean, counter) in [(&pressed, &mut touched), (&rest, &mut at_rest)] {
                 for _ in 0..EACH {
                     let reading = measure(layout, clean, &errors, &mut rng);
-                    let track = tracker.follow(f64::from(count) / RATE_HZ, &reading).unwrap();
+                    let track = tracker.update(f64::from(count) / RATE_HZ, &reading).unwrap();
                     count += 1;
                     *counter += usize::from(!track.contacts.is_empty());
                 }
@@ -469,7 +469,7 @@ fn the_check_of_the_locators_intervals_widens_tracks() {
         let likelihood = likelihood(&rig, None).with_interval_check(check);
         let mut tracker = SmoothTracker::new(Arc::new(likelihood), TrackerConfig::default());
         for (time_s, _, reading) in readings.iter().take(150) {
-            tracker.follow(*time_s, reading).unwrap();
+            tracker.update(*time_s, reading).unwrap();
         }
         [tracker.filtered().to_vec(), tracker.smoothed(Watch::NONE).unwrap()]
             .map(|tracks| tracks[140].contacts[0])

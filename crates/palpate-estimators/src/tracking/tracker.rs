@@ -4,7 +4,7 @@ use super::bank::Step;
 use super::belief::{Belief, Moments, Observation};
 use super::birth::BirthModel;
 use super::slow::{SlowState, widen};
-use super::{Track, TrackError, Tracked, TrackerConfig};
+use super::{Track, TrackError, TrackedContact, TrackerConfig};
 use crate::force_prior::ForcePrior;
 use crate::likelihood::{Geometry, Likelihood};
 use ndarray::Array2;
@@ -37,8 +37,8 @@ const UNSEEN: f64 = 9.0;
 /// let config = TrackerConfig::default();
 /// let tracking = locator.tracking(&config)?;
 /// let mut tracker = Tracker::new(tracking.likelihood(), config);
-/// tracker.follow(0.0, &presses.rows[20].reading)?;
-/// let track = tracker.follow(0.01, &presses.rows[21].reading)?;
+/// tracker.update(0.0, &presses.rows[20].reading)?;
+/// let track = tracker.update(0.01, &presses.rows[21].reading)?;
 /// assert!((track.contacts[0].x_m - mm(180.0)).abs() < mm(1.0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -74,7 +74,7 @@ struct LogBirthProbabilities {
     /// Simultaneous.
     two: f64,
     /// Beside one contact.
-    beside: f64,
+    second_contact: f64,
 }
 
 impl Tracker {
@@ -96,7 +96,7 @@ impl Tracker {
     ///
     /// # Errors
     /// [`TrackError`] unless time increases, without effect.
-    pub fn follow(&mut self, time_s: f64, reading: &[f64]) -> Result<Track, TrackError> {
+    pub fn update(&mut self, time_s: f64, reading: &[f64]) -> Result<Track, TrackError> {
         let duration_s = match self.time_s {
             Some(before_s) if time_s > before_s => Some(time_s - before_s),
             Some(before_s) => return Err(TrackError::Time { time_s, before_s }),
@@ -107,7 +107,7 @@ impl Tracker {
         likelihood.whiten(reading, &mut whitened);
         let mut reading = reading.to_vec();
         if let Some(slow) = self.slow(reading.len()) {
-            slow.take_off(time_s, duration_s, &mut whitened, &mut reading);
+            slow.subtract(time_s, duration_s, &mut whitened, &mut reading);
         }
         let is_residue = likelihood.is_residue(&reading);
         let mut single = likelihood.single_estimate(&reading);
@@ -123,7 +123,7 @@ impl Tracker {
             swings: self.config.swing.is_some(),
         };
         let born = self.births(log_births, observation, &single);
-        self.update(observation);
+        self.apply_observation(observation);
         born.into_iter().for_each(|(weight, belief)| self.add(weight, belief));
         let moments = self.prune();
         let mut track = self.track(time_s, single, moments);
@@ -139,7 +139,7 @@ impl Tracker {
         }
         self.whitened = whitened;
         self.time_s = Some(time_s);
-        Tracked::widen_by_check(&mut track.contacts, &*likelihood);
+        TrackedContact::widen_by_check(&mut track.contacts, &*likelihood);
         Ok(track)
     }
 
@@ -172,9 +172,9 @@ impl Tracker {
         // At the first reading, all numbers of contacts are equally probable.
         let Some(duration_s) = duration_s else {
             let each = -((1 + self.most_contacts()) as f64).ln();
-            let belief = Belief::nothing();
+            let belief = Belief::no_contact();
             self.add(each, belief);
-            return LogBirthProbabilities { one: each, two: each, beside: f64::NEG_INFINITY };
+            return LogBirthProbabilities { one: each, two: each, second_contact: f64::NEG_INFINITY };
         };
         let changes = 0.5 * (1.0 - (-2.0 * self.config.changes_per_s * duration_s).exp());
         let jumps = 1.0 - (-self.config.jumps_per_s * duration_s).exp();
@@ -199,14 +199,14 @@ impl Tracker {
         LogBirthProbabilities {
             one: (with[0] * changes + with[1] * jumps + with[2] * changes * jumps).ln(),
             two: (with[0] * changes * changes + with[1] * changes * jumps + with[2] * jumps).ln(),
-            beside: changes.ln(),
+            second_contact: changes.ln(),
         }
     }
 
     fn end_contacts(&mut self) {
         self.hypotheses.retain(|hypothesis| hypothesis.belief.contacts() == 0);
         if self.hypotheses.is_empty() {
-            self.add(0.0, Belief::nothing());
+            self.add(0.0, Belief::no_contact());
         }
     }
 
@@ -230,7 +230,7 @@ impl Tracker {
         self.next_id += 1;
     }
 
-    fn update(&mut self, observation: Observation) {
+    fn apply_observation(&mut self, observation: Observation) {
         for hypothesis in &mut self.hypotheses {
             match hypothesis.belief.updated(observation) {
                 Some((belief, evidence)) => {
@@ -258,7 +258,7 @@ impl Tracker {
                 let mut born: Vec<_> = births.first_contacts().into_iter().map(weighted).collect();
                 for hypothesis in &self.hypotheses {
                     if let Belief::One(bank) = &hypothesis.belief {
-                        let weight = hypothesis.weight + log_births.beside;
+                        let weight = hypothesis.weight + log_births.second_contact;
                         born.extend(
                             births.second_contact(bank).map(|(evidence, belief)| (weight + evidence, belief)),
                         );
@@ -280,7 +280,7 @@ impl Tracker {
         if best == f64::NEG_INFINITY {
             // A reading that no hypothesis explains has no information: restart.
             self.hypotheses.clear();
-            self.add(0.0, Belief::nothing());
+            self.add(0.0, Belief::no_contact());
             return vec![Vec::new()];
         }
         let mut kept: Vec<Hypothesis> = Vec::with_capacity(MOST_HYPOTHESES);
@@ -326,7 +326,7 @@ impl Tracker {
             self.hypotheses.iter().zip(moments).filter(|(one, _)| one.belief.contacts() == number);
         let beliefs: Vec<(f64, Vec<Moments>)> =
             of_number.map(|(hypothesis, contacts)| (hypothesis.weight.exp(), contacts)).collect();
-        let contacts = Tracked::from_mixture(&beliefs, &*self.likelihood);
+        let contacts = TrackedContact::from_mixture(&beliefs, &*self.likelihood);
         Track { time_s, numbers, contacts, single }
     }
 }
@@ -342,7 +342,7 @@ pub struct SmoothTracker {
     tracker: Tracker,
     tracks: Vec<Track>,
     /// Hypotheses at each reading, by id.
-    past: Vec<Vec<(u64, Belief)>>,
+    history: Vec<Vec<(u64, Belief)>>,
     /// After each reading; empty without drift.
     drift_covariances: Vec<Array2<f64>>,
 }
@@ -353,19 +353,19 @@ impl SmoothTracker {
         Self {
             tracker: Tracker::new(likelihood, config),
             tracks: Vec::new(),
-            past: Vec::new(),
+            history: Vec::new(),
             drift_covariances: Vec::new(),
         }
     }
 
-    /// Updates as [`Tracker::follow`].
+    /// Updates as [`Tracker::update`].
     ///
     /// # Errors
     /// [`TrackError`].
-    pub fn follow(&mut self, time_s: f64, reading: &[f64]) -> Result<(), TrackError> {
-        let track = self.tracker.follow(time_s, reading)?;
+    pub fn update(&mut self, time_s: f64, reading: &[f64]) -> Result<(), TrackError> {
+        let track = self.tracker.update(time_s, reading)?;
         let lasts = |id: u64| self.tracker.hypotheses.iter().any(|hypothesis| hypothesis.id == id);
-        if let Some(before) = self.past.last_mut() {
+        if let Some(before) = self.history.last_mut() {
             // Smoothing needs only hypotheses that lasted or were reported.
             let shown = before.first().map(|(id, _)| *id);
             before.retain(|(id, _)| shown == Some(*id) || lasts(*id));
@@ -376,7 +376,7 @@ impl SmoothTracker {
             with_contacts.map(|hypothesis| (hypothesis.id, hypothesis.belief.clone())).collect();
         // The reported hypothesis comes first.
         remembered.sort_by_key(|(_, belief)| belief.contacts() != track.contacts.len());
-        self.past.push(remembered);
+        self.history.push(remembered);
         self.drift_covariances
             .extend(self.tracker.slow.as_ref().and_then(SlowState::drift_covariance).cloned());
         self.tracks.push(track);
@@ -405,22 +405,23 @@ impl SmoothTracker {
             let number = self.tracks[k].contacts.len();
             let lasting = later.and_then(|(id, belief)| self.smoothed_belief(k, id, &belief));
             let lasting = lasting.filter(|(_, belief)| belief.contacts() == number);
-            let last = || self.past[k].first().cloned();
+            let last = || self.history[k].first().cloned();
             later = if number > 0 { lasting.or_else(last) } else { None };
             let moments = later.as_ref().map(|(_, belief)| belief.moments());
             let likelihood = &*self.tracker.likelihood;
             let contacts = &mut smoothed[k].contacts;
-            *contacts = moments.map_or_else(Vec::new, |moments| Tracked::from_belief(&moments, likelihood));
+            *contacts =
+                moments.map_or_else(Vec::new, |moments| TrackedContact::from_belief(&moments, likelihood));
             if let Some(covariance) = self.drift_covariances.get(k) {
                 widen(covariance, likelihood, contacts);
             }
-            Tracked::widen_by_check(contacts, likelihood);
+            TrackedContact::widen_by_check(contacts, likelihood);
         }
         Ok(smoothed)
     }
 
     fn smoothed_belief(&self, k: usize, id: u64, later: &Belief) -> Option<(u64, Belief)> {
-        let (_, belief) = self.past[k].iter().find(|(remembered, _)| *remembered == id)?;
+        let (_, belief) = self.history[k].iter().find(|(remembered, _)| *remembered == id)?;
         let step = self.tracker.step(self.tracks[k + 1].time_s - self.tracks[k].time_s);
         belief.smoothed(&step, self.tracker.likelihood.geometry(), later).map(|belief| (id, belief))
     }

@@ -3,7 +3,7 @@
 use crate::arrangement::Training;
 use crate::closed_form::ClosedForm;
 use crate::fit::{Fit, FitTask, Locate, NoCheck};
-use crate::fixtures::{Covered, Example, paper};
+use crate::fixtures::{CoverageTally, Example, paper};
 use crate::force_prior::DECADE;
 use crate::influence::{Influence, InfluenceSource};
 use crate::simulate::clean_reading;
@@ -38,8 +38,8 @@ fn covered(
     x_m: f64,
     force_n: f64,
     rng: &mut Xoshiro256PlusPlus,
-) -> Covered {
-    let mut row = Covered::default();
+) -> CoverageTally {
+    let mut row = CoverageTally::default();
     let surface = bench.setup.surface().model().unwrap();
     let contact = Contact { position: Position::along(x_m), force_n };
     let truth = clean_reading(surface, bench.setup.layout(), contact);
@@ -57,8 +57,8 @@ fn check(title: &str, bench: &Example, locators: &[Box<dyn Locate<Check = NoChec
     for force_n in forces_n {
         for place_mm in PLACES_MM {
             let row = covered(bench, locators, 1e-3 * place_mm, *force_n, &mut rng);
-            let (place, force) = (row.percent(row.along), row.percent(row.force));
-            let good = |percent: f64| COVERED_PERCENT.contains(&percent) || row.found < row.readings;
+            let (place, force) = (row.percent(row.x_covered), row.percent(row.force));
+            let good = |percent: f64| COVERED_PERCENT.contains(&percent) || row.detected < row.readings;
             if !good(place)
                 || force < *COVERED_PERCENT.start()
                 || row.outside > 0

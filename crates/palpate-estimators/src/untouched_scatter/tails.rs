@@ -6,7 +6,7 @@ use palpate_numerics::{normal_quantile, student_critical_value, student_ln_densi
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct HeavyTails {
     /// ν.
-    freedom: f64,
+    degrees_of_freedom: f64,
     /// The standard deviation is √(ν/(ν − 2)) times this.
     scale: f64,
 }
@@ -25,7 +25,8 @@ impl HeavyTails {
         let normal = -0.5 * total * ((std::f64::consts::TAU * variance).ln() + 1.0);
         let tried = (0..=POWERS).map(|power| {
             let freedom = LEAST * f64::from(power).exp2().sqrt();
-            let tails = Self { freedom, scale: most_likely_scale(deviations, variance, freedom) };
+            let tails =
+                Self { degrees_of_freedom: freedom, scale: most_likely_scale(deviations, variance, freedom) };
             (tails, tails.log_likelihood(deviations))
         });
         let (best, likelihood) = tried.max_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -36,7 +37,7 @@ impl HeavyTails {
 
     fn log_likelihood(&self, deviations: &[(f64, f64)]) -> f64 {
         let of_one = |(z, weight): &(f64, f64)| {
-            weight * (student_ln_density(z / self.scale, self.freedom) - self.scale.ln())
+            weight * (student_ln_density(z / self.scale, self.degrees_of_freedom) - self.scale.ln())
         };
         deviations.iter().map(of_one).sum()
     }
@@ -46,7 +47,7 @@ impl HeavyTails {
     /// Introduction to Heavy-Tailed and Subexponential Distributions*, 2013).
     pub fn bound(&self, channels: usize, share: f64, rate: f64) -> f64 {
         let n = channels as f64;
-        let x = self.scale * student_critical_value(rate / (2.0 * n), self.freedom);
+        let x = self.scale * student_critical_value(rate / (2.0 * n), self.degrees_of_freedom);
         0.5 * share * x * x + (n - 1.0)
     }
 }
@@ -82,7 +83,7 @@ mod tests {
     #[test]
     fn heavy_tails_are_found_with_their_freedom_and_normal_ones_are_none() {
         for seed in 0..10 {
-            let HeavyTails { freedom, scale } =
+            let HeavyTails { degrees_of_freedom: freedom, scale } =
                 HeavyTails::of_deviations(&deviations(4.0, 2000, seed)).unwrap();
             assert!((2.5..=6.0).contains(&freedom) && (scale - 1.0).abs() < 0.15, "{freedom} {scale}");
         }
@@ -96,7 +97,7 @@ mod tests {
     #[test]
     fn differences_of_heavy_tailed_rows_exceed_the_bound_at_the_rate() {
         const CHANNELS: usize = 6;
-        let tails = HeavyTails { freedom: 4.0, scale: 0.5_f64.sqrt() };
+        let tails = HeavyTails { degrees_of_freedom: 4.0, scale: 0.5_f64.sqrt() };
         for rate in [0.01, 0.001] {
             let bound = tails.bound(CHANNELS, 1.0, rate);
             let rows = deviations(4.0, 2 * CHANNELS * 100_000, 1);

@@ -99,7 +99,7 @@ fn noise_explains_the_rests_of_19_recordings_in_20_and_no_residue() {
 }
 
 #[test]
-fn few_rests_or_one_long_one_tell_no_scatter() {
+fn few_rests_or_one_long_rest_give_no_scatter() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let mut few = recording(&mut rng, 4, [3.0, 0.0], 0.0);
     assert!(Deviations::of_rests(&few).is_none());
@@ -110,7 +110,7 @@ fn few_rests_or_one_long_one_tell_no_scatter() {
 }
 
 #[test]
-fn disabled_channels_say_nothing() {
+fn disabled_channels_have_no_scatter() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let rests = Deviations::of_rests(&recording(&mut rng, 40, [3.0, 0.0], 0.0)).unwrap();
     let mut setup = setup();
@@ -121,7 +121,7 @@ fn disabled_channels_say_nothing() {
     assert!(!all.contains(&reading));
     all.disable(2);
     assert!(all.contains(&reading));
-    setup.set_dead(2, true);
+    setup.set_disabled(2, true);
     let without = scatter(&setup);
     assert!(without.contains(&reading) && without.bound < all.bound);
     reading[3] = 100.0;

@@ -114,7 +114,7 @@ mod tests {
         let errors_m = errors_by_press(&recording, &evaluation);
         assert_eq!(errors_m.len(), 60);
         for (row, error_m) in recording.rows.iter().zip(&errors_m) {
-            let is_its_own = |located: &&palpate_estimators::evaluation::Located| {
+            let is_its_own = |located: &&palpate_estimators::evaluation::EvaluatedContact| {
                 located.truth == row.position && Some(located.error_m()) == *error_m
             };
             assert!(evaluation.located.iter().any(|located| is_its_own(&located)), "{row:?} {error_m:?}");

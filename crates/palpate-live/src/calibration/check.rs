@@ -1,6 +1,6 @@
 //! Check of a locator at fresh places.
 
-use super::plan::{Ruler, Weights};
+use super::plan::{PlaceGrid, Weights};
 use super::press::Press;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::evaluation::Evaluation;
@@ -34,7 +34,7 @@ fn fresh_places(calibrated: &[Position], extent: Extent) -> Vec<Position> {
     /// Share of the largest distance that counts as far.
     const FAR: f64 = 0.9;
     let Some((low, high)) = bounds(calibrated) else { return Vec::new() };
-    let ruler = Ruler::among(calibrated, extent);
+    let ruler = PlaceGrid::from_positions(calibrated, extent);
     let is_along_x = high.x_m - low.x_m >= high.y_m - low.y_m;
     let place = |along: f64, across: f64| {
         let (x, y) = if is_along_x { (along, across) } else { (across, along) };

@@ -7,7 +7,7 @@
 
 use super::baseline::{Baseline, NOISE_LIMIT_SD};
 use super::press::Press;
-use super::repeat_check::{Doubt, GROWTH, RepeatCheck, TouchReading};
+use super::repeat_check::{GROWTH, RepeatCheck, RetakeReason, TouchReading};
 use super::stretch::{REST_SPAN, Stretch, mean};
 use palpate_estimators::recording::Row;
 use palpate_mechanics::contact::Position;
@@ -49,7 +49,7 @@ const SILENCE: Duration = Duration::from_secs(5);
 /// Awaited step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Waiting {
+pub enum AwaitedStep {
     /// Learning of the baseline.
     Untouched,
     /// The next press.
@@ -77,7 +77,7 @@ pub enum Progress {
     /// No change.
     None,
     /// Another step is awaited.
-    Waits(Waiting),
+    Waits(AwaitedStep),
     /// A press was recorded.
     Pressed {
         /// Untouched row before it; `None` if already recorded.
@@ -90,9 +90,9 @@ pub enum Progress {
     /// The last untouched row was recorded.
     Untouched(RestingRow),
     /// The press is requested again.
-    AskedAgain(Doubt),
+    AskedAgain(RetakeReason),
     /// The recorded press is requested again.
-    TakenBack(Doubt),
+    TakenBack(RetakeReason),
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -121,7 +121,7 @@ struct Growth {
 pub struct Guide {
     plan: Vec<Press>,
     next: usize,
-    waiting: Waiting,
+    awaited: AwaitedStep,
     /// Start of the wait, or last update of the baseline.
     since: Duration,
     last_at: Option<Duration>,
@@ -134,7 +134,7 @@ pub struct Guide {
     reference: Vec<f64>,
     touch: Touch,
     /// Deviation before the release.
-    pressed: Vec<f64>,
+    press_deviation: Vec<f64>,
     is_recorded: bool,
     growth: Growth,
     /// Largest remaining effect of a finger after a lift.
@@ -147,11 +147,11 @@ pub struct Guide {
 impl Guide {
     /// Creates the guide of a plan.
     pub fn new(plan: Vec<Press>) -> Self {
-        let waiting = if plan.is_empty() { Waiting::Nothing } else { Waiting::Untouched };
+        let waiting = if plan.is_empty() { AwaitedStep::Nothing } else { AwaitedStep::Untouched };
         Self {
             plan,
             next: 0,
-            waiting,
+            awaited: waiting,
             since: Duration::ZERO,
             last_at: None,
             is_sample_and_hold: false,
@@ -160,7 +160,7 @@ impl Guide {
             untouched: None,
             reference: Vec::new(),
             touch: Touch::default(),
-            pressed: Vec::new(),
+            press_deviation: Vec::new(),
             is_recorded: false,
             growth: Growth::default(),
             lingering: 0.0,
@@ -191,8 +191,8 @@ impl Guide {
     }
 
     /// Awaited step.
-    pub fn waiting(&self) -> Waiting {
-        self.waiting
+    pub fn awaited_step(&self) -> AwaitedStep {
+        self.awaited
     }
 
     /// True if the source repeats readings, because its sensors are slower.
@@ -213,31 +213,31 @@ impl Guide {
     /// Explains the awaited condition, if necessary.
     pub fn explain(&self) -> Option<String> {
         let Some(baseline) = &self.baseline else {
-            return (self.waiting == Waiting::Untouched)
+            return (self.awaited == AwaitedStep::Untouched)
                 .then(|| "the reading must rest for a second; it still changes".to_owned());
         };
         let latest = mean(&self.stretch.latest()?);
         let size = baseline.size(&latest);
-        match self.waiting {
-            Waiting::Press => {
+        match self.awaited {
+            AwaitedStep::Press => {
                 let smallest = self.checks.smallest_size(baseline)?;
                 Some(format!(
                     "the reading is {:.1} % of the smallest press off the untouched one",
                     100.0 * size / smallest
                 ))
             }
-            Waiting::Rest => {
+            AwaitedStep::Rest => {
                 let percent = 100.0 * baseline.change(&self.stretch.latest()?) / size.max(1.0);
                 Some(format!(
                     "the reading must rest; it changes by {percent:.1} % in 0.2 s ({:.1} % at most)",
                     100.0 * REST_SHARE
                 ))
             }
-            Waiting::Release => Some(format!(
+            AwaitedStep::Release => Some(format!(
                 "the reading is still at {:.0} % of the press; if the surface is untouched, take this reading as untouched",
-                100.0 * size / baseline.size_of(&self.pressed).max(1.0)
+                100.0 * size / baseline.size_of(&self.press_deviation).max(1.0)
             )),
-            Waiting::Untouched | Waiting::Nothing => None,
+            AwaitedStep::Untouched | AwaitedStep::Nothing => None,
         }
     }
 
@@ -251,21 +251,21 @@ impl Guide {
             return Progress::None;
         }
         self.stretch.add(at, reading);
-        match (self.waiting, self.baseline.take()) {
-            (Waiting::Nothing, baseline) => {
+        match (self.awaited, self.baseline.take()) {
+            (AwaitedStep::Nothing, baseline) => {
                 self.baseline = baseline;
                 Progress::None
             }
-            (Waiting::Untouched, _) | (_, None) => self.learn_baseline(at),
+            (AwaitedStep::Untouched, _) | (_, None) => self.learn_baseline(at),
             (waiting, Some(mut baseline)) => {
-                self.touch.follow(&baseline, reading, &self.stretch);
+                self.touch.update(&baseline, reading, &self.stretch);
                 let progress = match waiting {
-                    Waiting::Press => self.await_press(at, &mut baseline),
-                    Waiting::Rest => self.await_rest(at, &mut baseline),
+                    AwaitedStep::Press => self.await_press(at, &mut baseline),
+                    AwaitedStep::Rest => self.await_rest(at, &mut baseline),
                     _ => self.await_release(at, &mut baseline),
                 };
                 // In a step that waits for the untouched reading, the old one is discarded.
-                if self.waiting != Waiting::Untouched {
+                if self.awaited != AwaitedStep::Untouched {
                     self.baseline = Some(baseline);
                 }
                 progress
@@ -299,24 +299,24 @@ impl Guide {
     pub fn relearn(&mut self) {
         self.stretch.clear();
         self.touch = Touch::default();
-        if self.waiting != Waiting::Nothing {
+        if self.awaited != AwaitedStep::Nothing {
             self.baseline = None;
             self.untouched = None;
             self.reference.clear();
-            self.waiting = Waiting::Untouched;
+            self.awaited = AwaitedStep::Untouched;
         }
     }
 
     /// Ends the calibration early.
     pub fn stop(&mut self) {
         self.plan.truncate(self.next);
-        self.waiting = Waiting::Nothing;
+        self.awaited = AwaitedStep::Nothing;
     }
 
     /// Adds presses to the plan.
     pub fn extend(&mut self, presses: impl IntoIterator<Item = Press>) {
         self.plan.extend(presses);
-        if self.waiting == Waiting::Nothing {
+        if self.awaited == AwaitedStep::Nothing {
             self.restart();
         }
     }
@@ -327,28 +327,28 @@ impl Guide {
     }
 
     fn restart(&mut self) {
-        self.waiting = match self.waiting {
-            _ if self.next >= self.plan.len() => Waiting::Nothing,
-            _ if self.baseline.is_none() => Waiting::Untouched,
+        self.awaited = match self.awaited {
+            _ if self.next >= self.plan.len() => AwaitedStep::Nothing,
+            _ if self.baseline.is_none() => AwaitedStep::Untouched,
             // The present touch belongs to another press.
-            Waiting::Rest => {
-                self.pressed = self.present_deviation();
-                Waiting::Release
+            AwaitedStep::Rest => {
+                self.press_deviation = self.current_deviation();
+                AwaitedStep::Release
             }
-            Waiting::Release => Waiting::Release,
-            Waiting::Untouched | Waiting::Press | Waiting::Nothing => Waiting::Press,
+            AwaitedStep::Release => AwaitedStep::Release,
+            AwaitedStep::Untouched | AwaitedStep::Press | AwaitedStep::Nothing => AwaitedStep::Press,
         };
     }
 
-    fn present_deviation(&self) -> Vec<f64> {
+    fn current_deviation(&self) -> Vec<f64> {
         match (&self.baseline, self.stretch.last()) {
             (Some(baseline), Some(reading)) => baseline.deviation(reading),
             _ => Vec::new(),
         }
     }
 
-    fn wait(&mut self, at: Duration, waiting: Waiting) -> Progress {
-        self.waiting = waiting;
+    fn wait(&mut self, at: Duration, waiting: AwaitedStep) -> Progress {
+        self.awaited = waiting;
         self.since = at;
         Progress::Waits(waiting)
     }
@@ -380,17 +380,17 @@ impl Guide {
     fn begin_press(&mut self, at: Duration) -> Progress {
         self.touch = Touch::default();
         if self.next < self.plan.len() {
-            return self.wait(at, Waiting::Press);
+            return self.wait(at, AwaitedStep::Press);
         }
-        self.wait(at, Waiting::Nothing);
-        self.untouched.take().map_or(Progress::Waits(Waiting::Nothing), Progress::Untouched)
+        self.wait(at, AwaitedStep::Nothing);
+        self.untouched.take().map_or(Progress::Waits(AwaitedStep::Nothing), Progress::Untouched)
     }
 
     fn await_press(&mut self, at: Duration, baseline: &mut Baseline) -> Progress {
         let recovery = if self.is_recovering { self.checks.largest_size(baseline) } else { 0.0 };
         let least = NOISE_LIMIT_SD.max(RESIDUE_SHARE * recovery);
         if self.touch.has_begun(least) {
-            return self.wait(at, Waiting::Rest);
+            return self.wait(at, AwaitedStep::Rest);
         }
         if let Some(latest) = self.stretch.latest() {
             let mean = mean(&latest);
@@ -435,7 +435,7 @@ impl Guide {
             let reference = std::mem::take(&mut self.reference);
             self.relearn();
             self.reference = reference;
-            return Progress::AskedAgain(Doubt::Drift);
+            return Progress::AskedAgain(RetakeReason::Drift);
         }
         self.take_press(at, mean, baseline)
     }
@@ -443,13 +443,13 @@ impl Guide {
     fn take_press(&mut self, at: Duration, mean: Vec<f64>, baseline: &Baseline) -> Progress {
         let Some(press) = self.plan.get(self.next).copied() else { return Progress::None };
         let touch = TouchReading { deviation: baseline.deviation(&mean), reading: mean.clone() };
-        let doubt = self.checks.doubt(&press, &touch, baseline);
+        let doubt = self.checks.retake_reason(&press, &touch, baseline);
         if doubt.is_some() && at.saturating_sub(*self.touch.doubtful_since.get_or_insert(at)) < LINGER {
             return Progress::None;
         }
-        self.pressed.clone_from(&touch.deviation);
+        self.press_deviation.clone_from(&touch.deviation);
         self.growth = Growth::default();
-        self.wait(at, Waiting::Release);
+        self.wait(at, AwaitedStep::Release);
         if let Some(doubt) = doubt {
             self.checks.refuse(touch);
             self.is_recorded = false;
@@ -469,11 +469,11 @@ impl Guide {
 
     fn await_release(&mut self, at: Duration, baseline: &mut Baseline) -> Progress {
         if let Some(reading) = self.stretch.last() {
-            self.growth.follow(at, baseline.deviation(reading), &self.pressed, baseline);
+            self.growth.update(at, baseline.deviation(reading), &self.press_deviation, baseline);
         }
         let Some(latest) = self.stretch.latest() else { return Progress::None };
         let mean = mean(&latest);
-        let (size, pressed) = (baseline.size(&mean), baseline.size_of(&self.pressed));
+        let (size, pressed) = (baseline.size(&mean), baseline.size_of(&self.press_deviation));
         if size > GROWTH * pressed && baseline.is_at_rest(&latest, REST_SHARE * size) {
             return self.replace_press(at, mean, baseline);
         }
@@ -500,25 +500,25 @@ impl Guide {
             return Progress::None;
         }
         if self.is_recorded && self.growth.has_lasted {
-            return self.take_back(at, mean, baseline);
+            return self.undo_press(at, mean, baseline);
         }
         self.lingering = limit.max(size);
         self.is_recovering = !baseline.is_at_rest(&latest, 0.0);
         self.return_to_untouched(at, mean, baseline)
     }
 
-    fn take_back(&mut self, at: Duration, mean: Vec<f64>, baseline: &mut Baseline) -> Progress {
+    fn undo_press(&mut self, at: Duration, mean: Vec<f64>, baseline: &mut Baseline) -> Progress {
         self.next = self.next.saturating_sub(1);
         self.checks.outgrow_last(std::mem::take(&mut self.growth.deviation));
         self.is_recorded = false;
         self.is_recovering = !self.stretch.latest().is_some_and(|latest| baseline.is_at_rest(&latest, 0.0));
         self.return_to_untouched(at, mean, baseline);
-        Progress::TakenBack(Doubt::Grew)
+        Progress::TakenBack(RetakeReason::Grew)
     }
 
     fn replace_press(&mut self, at: Duration, mean: Vec<f64>, baseline: &Baseline) -> Progress {
         if !self.is_recorded {
-            return self.wait(at, Waiting::Rest);
+            return self.wait(at, AwaitedStep::Rest);
         }
         let Some(press) = self.next.checked_sub(1).and_then(|last| self.plan.get(last)).copied() else {
             return Progress::None;
@@ -526,7 +526,7 @@ impl Guide {
         let deviation = baseline.deviation(&mean);
         self.checks.forget_last();
         self.checks.record(&press, TouchReading { deviation: deviation.clone(), reading: mean.clone() });
-        self.pressed = deviation;
+        self.press_deviation = deviation;
         self.growth = Growth::default();
         self.since = at;
         Progress::Replaced(self.press_row(&press, mean))
@@ -565,14 +565,14 @@ impl Guide {
     /// True for a mean opposite to the last press, by at most the effect of a lingering finger.
     fn is_late_lift(&self, mean: &[f64], baseline: &Baseline) -> bool {
         let deviation = baseline.deviation(mean);
-        let lengths = baseline.length_of(&deviation) * baseline.length_of(&self.pressed);
+        let lengths = baseline.length_of(&deviation) * baseline.length_of(&self.press_deviation);
         baseline.size_of(&deviation) <= self.lingering
-            && baseline.product_of(&deviation, &self.pressed) < AGAINST * lengths
+            && baseline.product_of(&deviation, &self.press_deviation) < AGAINST * lengths
     }
 }
 
 impl Growth {
-    fn follow(&mut self, at: Duration, deviation: Vec<f64>, pressed: &[f64], baseline: &Baseline) {
+    fn update(&mut self, at: Duration, deviation: Vec<f64>, pressed: &[f64], baseline: &Baseline) {
         let size = baseline.size_of(&deviation);
         if size <= GROWTH * baseline.size_of(pressed) {
             self.readings = 0;
@@ -590,7 +590,7 @@ impl Growth {
 }
 
 impl Touch {
-    fn follow(&mut self, baseline: &Baseline, reading: &[f64], stretch: &Stretch) {
+    fn update(&mut self, baseline: &Baseline, reading: &[f64], stretch: &Stretch) {
         let size = baseline.size(reading);
         self.peak = self.peak.max(size.min(self.recent[0]).min(self.recent[1]));
         self.recent = [self.recent[1], size];

@@ -162,7 +162,7 @@ impl Journal {
     ///
     /// # Errors
     /// [`JournalError::Write`].
-    pub fn take_back(&mut self) -> Result<(), JournalError> {
+    pub fn remove_last_press(&mut self) -> Result<(), JournalError> {
         if let Some(last) = self.rows.iter().rposition(Row::touches) {
             self.rows.truncate(last);
             self.traces.truncate(last);

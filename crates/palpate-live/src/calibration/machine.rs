@@ -1,10 +1,10 @@
 //! Machine of a calibration.
 
-use super::guide::Waiting;
+use super::guide::AwaitedStep;
 use super::press::Press;
 use super::run::{Calibration, Note};
 use super::set_up::{SetUp, SetUpAction, SetUpNote, SetUpTask};
-use crate::stage::{Done, Doubt, Finger, Order, StageError, StageThread, Stopping};
+use crate::stage::{Finger, Order, StageError, StagePosition, StageThread, StopReason, Stopping};
 use palpate_rig::Stage;
 use serde::Serialize;
 use std::time::Duration;
@@ -65,13 +65,13 @@ impl MachineError {
     pub fn help(&self) -> &'static str {
         match self {
             Self::Stage(StageError::Line(_)) => "check that it is on, and at this port",
-            Self::Stage(StageError::Doubt { doubt: Doubt::OffPosition { .. }, .. }) => {
+            Self::Stage(StageError::Unexpected { reason: StopReason::OffPosition { .. }, .. }) => {
                 "check that `origin`, `touch` and `depths` of [stage] are within its travel; then reset it"
             }
-            Self::Stage(StageError::Doubt { finger: Finger::Unmoved, .. }) => {
+            Self::Stage(StageError::Unexpected { finger: Finger::Unmoved, .. }) => {
                 "reset it, and check that no other program uses its port"
             }
-            Self::Stage(StageError::Doubt { .. }) => {
+            Self::Stage(StageError::Unexpected { .. }) => {
                 "check its display, and that its path is free; then reset it"
             }
             Self::Stage(StageError::Unknown { .. }) => "give the baud rate of its firmware",
@@ -213,7 +213,7 @@ impl Machine {
     /// True after all work.
     pub fn is_done(&self, calibration: &Calibration) -> bool {
         match &self.set_up {
-            None => calibration.guide().waiting() == Waiting::Nothing,
+            None => calibration.guide().awaited_step() == AwaitedStep::Nothing,
             Some(set_up) => set_up.has_ended(),
         }
     }
@@ -222,7 +222,7 @@ impl Machine {
     ///
     /// # Errors
     /// [`MachineError`] of the stop.
-    pub fn heed(&mut self, notes: &[Note]) -> Result<(), MachineError> {
+    pub fn stop_on_notes(&mut self, notes: &[Note]) -> Result<(), MachineError> {
         let error = notes.iter().find_map(|note| match note {
             Note::Saturated(name) => Some(MachineError::Saturated { name: name.clone() }),
             Note::Overload(force_n) => {
@@ -258,7 +258,7 @@ impl Machine {
             return self.fail(MachineError::Silent);
         }
         match self.thread.done() {
-            Some(Ok(Done::Up(at_m))) => {
+            Some(Ok(StagePosition::Up(at_m))) => {
                 if let Some(error) = self.ends_with.take() {
                     self.thread.close();
                     return Err(error);
@@ -266,7 +266,7 @@ impl Machine {
                 self.at_m = Some(at_m);
                 self.enter(Motion::Up, calibration);
             }
-            Some(Ok(Done::Down(at_m))) => {
+            Some(Ok(StagePosition::Down(at_m))) => {
                 self.at_m = Some(at_m);
                 self.enter(Motion::Down, calibration);
             }
@@ -307,27 +307,27 @@ impl Machine {
 
     fn press_next(&mut self, calibration: &mut Calibration) -> Result<Option<MachineNote>, MachineError> {
         let waited = self.now.saturating_sub(self.since);
-        match (self.motion, calibration.guide().waiting()) {
+        match (self.motion, calibration.guide().awaited_step()) {
             (Motion::Blind, _) if self.readings > 0 => {
                 self.order(Order::Home, calibration);
                 return Ok(Some(MachineNote::Homing));
             }
-            (Motion::Up, Waiting::Press) => {
+            (Motion::Up, AwaitedStep::Press) => {
                 if let Some((_, press)) = calibration.guide().next_press() {
                     let depth_m = press.depth_m.unwrap_or_default();
                     self.press = Some(press);
                     self.order(Order::Press { position: press.position, depth_m }, calibration);
                 }
             }
-            (Motion::Up, Waiting::Untouched | Waiting::Release) if waited > RELEASED_WITHIN => {
+            (Motion::Up, AwaitedStep::Untouched | AwaitedStep::Release) if waited > RELEASED_WITHIN => {
                 self.thread.close();
                 return Err(MachineError::NoRest);
             }
-            (Motion::Down, Waiting::Untouched | Waiting::Release | Waiting::Nothing) => {
+            (Motion::Down, AwaitedStep::Untouched | AwaitedStep::Release | AwaitedStep::Nothing) => {
                 self.unseen = 0;
                 self.order(Order::Lift, calibration);
             }
-            (Motion::Down, Waiting::Press) if waited > SEEN_WITHIN => {
+            (Motion::Down, AwaitedStep::Press) if waited > SEEN_WITHIN => {
                 self.leave_out(calibration);
                 self.unseen += 1;
                 if self.unseen == MOST_UNSEEN {
@@ -335,7 +335,7 @@ impl Machine {
                 }
                 return Ok(Some(MachineNote::Unseen));
             }
-            (Motion::Down, Waiting::Rest) if waited > AT_REST_WITHIN => {
+            (Motion::Down, AwaitedStep::Rest) if waited > AT_REST_WITHIN => {
                 self.leave_out(calibration);
                 return Ok(Some(MachineNote::NoRest));
             }

@@ -23,12 +23,12 @@ mod trace;
 
 pub use assessment::{Assessment, Gain, HeldOut};
 pub use check::{CHECK_PLACES, Check, CheckedPlace, check_path, check_presses};
-pub use guide::{Guide, Progress, RestingRow, Waiting};
+pub use guide::{AwaitedStep, Guide, Progress, RestingRow};
 pub use journal::{DepthKnowledge, Journal, JournalError};
 pub use machine::{Machine, MachineError, MachineNote, Motion};
 pub use plan::{PlanError, Weights, plan};
 pub use press::Press;
-pub use repeat_check::Doubt;
+pub use repeat_check::RetakeReason;
 pub use repeats::{Place, deviation_percent, last_deviation_percent, places};
 pub use run::{Calibration, CalibrationError, Note};
 pub use set_up::{LONGEST_JOG_M, SetUpNote, SetUpTask, dry_run};

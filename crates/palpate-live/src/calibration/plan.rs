@@ -51,7 +51,7 @@ impl Weights {
 pub fn plan(rig: &Rig, weights: Weights, depths_m: &[f64], before: &[Row]) -> Result<Vec<Press>, PlanError> {
     let training = rig.training()?;
     let ruler = match depths_m {
-        [] => Ruler::for_places(rig)?,
+        [] => PlaceGrid::for_places(rig)?,
         _ => None,
     };
     let positions = training.positions(rig.setup.surface().extent())?;
@@ -84,12 +84,12 @@ pub fn plan(rig: &Rig, weights: Weights, depths_m: &[f64], before: &[Row]) -> Re
 
 /// Grid of places on a ruler.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Ruler {
+pub(super) struct PlaceGrid {
     steps_per_m: f64,
     extent: Extent,
 }
 
-impl Ruler {
+impl PlaceGrid {
     /// Ruler of a rig; `None` for listed places. The step is 1, 0.1, 0.01 or 0.001 mm: at most a fifth of the
     /// gap between places, and at most the gap to the edge. Places thus stay distinct and off the edge.
     pub fn for_places(rig: &Rig) -> Result<Option<Self>, PlanError> {
@@ -97,11 +97,11 @@ impl Ruler {
         if let Arrangement::Explicit(_) = training.arrangement {
             return Ok(None);
         }
-        Ok(Self::among(&training.positions(extent)?, extent))
+        Ok(Self::from_positions(&training.positions(extent)?, extent))
     }
 
     /// Ruler of these places; `None` if they are too close.
-    pub fn among(positions: &[Position], extent: Extent) -> Option<Self> {
+    pub fn from_positions(positions: &[Position], extent: Extent) -> Option<Self> {
         /// Up to a micrometre, finer than any finger.
         const STEPS_PER_M: [f64; 4] = [1e3, 1e4, 1e5, 1e6];
         const LARGEST_SHARE: f64 = 0.2;
@@ -137,7 +137,7 @@ fn least_gap_m(coordinates: &[f64]) -> f64 {
 /// Rounding of positions in a file.
 const ROUNDING_M: f64 = 1e-9;
 
-fn is_of(row: &Row, press: &Press, ruler: Option<Ruler>) -> bool {
+fn is_of(row: &Row, press: &Press, ruler: Option<PlaceGrid>) -> bool {
     let is_deep = match (row.nuisances.first(), press.depth_m) {
         (Some(row_m), Some(press_m)) => (row_m - press_m).abs() < ROUNDING_M,
         _ => true,
@@ -154,7 +154,7 @@ mod tests {
         Rig::from_toml(include_str!("../../../../examples/fsi-like.toml")).unwrap()
     }
 
-    fn pressed(press: &Press) -> Row {
+    fn press_row(press: &Press) -> Row {
         Row {
             position: press.position,
             force_n: Some(1.0),
@@ -190,7 +190,7 @@ mod tests {
     #[test]
     fn presses_of_before_are_not_asked_for_again() {
         let all = plan(&rig(), Weights::default(), &[1e-3, 2e-3], &[]).unwrap();
-        let mut before: Vec<Row> = all[..7].iter().map(pressed).collect();
+        let mut before: Vec<Row> = all[..7].iter().map(press_row).collect();
         // Rounded position, and untouched rows.
         before[2].position.x_m += 1e-13;
         before.push(Row { force_n: Some(0.0), position: Position::default(), ..before[0].clone() });
@@ -198,23 +198,23 @@ mod tests {
     }
 
     #[test]
-    fn presses_that_were_left_out_are_asked_for_again_wherever_they_stood() {
+    fn omitted_presses_are_requested_again_at_any_place() {
         let all = plan(&rig(), Weights::default(), &[1e-3, 2e-3], &[]).unwrap();
         // Missing: the second press of the first depth, the last of the second depth, and the third place.
         let left_out = |i: usize| [1, 5].contains(&i) || (12..18).contains(&i);
         let before: Vec<Row> =
-            all[..24].iter().enumerate().filter(|(i, _)| !left_out(*i)).map(|(_, p)| pressed(p)).collect();
+            all[..24].iter().enumerate().filter(|(i, _)| !left_out(*i)).map(|(_, p)| press_row(p)).collect();
         let expected = [&all[1..2], &all[5..6], &all[12..18], &all[24..]].concat();
         assert_eq!(plan(&rig(), Weights::default(), &[1e-3, 2e-3], &before).unwrap(), expected);
         // Extra presses do not count for another place.
-        let often: Vec<Row> = std::iter::repeat_n(pressed(&all[0]), 9).collect();
+        let often: Vec<Row> = std::iter::repeat_n(press_row(&all[0]), 9).collect();
         assert_eq!(plan(&rig(), Weights::default(), &[1e-3, 2e-3], &often).unwrap(), all[3..]);
     }
 
     #[test]
-    fn a_hand_s_presses_that_were_left_out_are_asked_for_again() {
+    fn omitted_presses_by_hand_are_requested_again() {
         let all = plan(&rig(), Weights::default(), &[], &[]).unwrap();
-        let before = [pressed(&all[0]), pressed(&all[4])];
+        let before = [press_row(&all[0]), press_row(&all[4])];
         let expected = [&all[..2], &all[3..5], &all[6..]].concat();
         assert_eq!(plan(&rig(), Weights::default(), &[], &before).unwrap(), expected);
     }
@@ -270,8 +270,10 @@ mod tests {
     fn presses_of_before_the_rounding_count() {
         let rig = beam("100 mm", "count = 11");
         let exact = rig.training().unwrap().positions(rig.setup.surface().extent()).unwrap();
-        let before: Vec<Row> =
-            exact.iter().map(|at| pressed(&Press { position: *at, force_n: None, depth_m: None })).collect();
+        let before: Vec<Row> = exact
+            .iter()
+            .map(|at| press_row(&Press { position: *at, force_n: None, depth_m: None }))
+            .collect();
         assert_eq!(plan(&rig, Weights::default(), &[], &before).unwrap(), []);
     }
 
@@ -285,7 +287,7 @@ mod tests {
         assert_eq!(presses[30].position, presses[6].position);
         // Rows with one weight do not count for the other.
         let before: Vec<Row> =
-            presses[..28].iter().map(|press| Row { force_n: press.force_n, ..pressed(press) }).collect();
+            presses[..28].iter().map(|press| Row { force_n: press.force_n, ..press_row(press) }).collect();
         assert_eq!(plan(&rig(), weights, &[], &before).unwrap(), presses[28..]);
         let twice = Weights { force_n: None, second_n: Some(1.0) };
         assert_eq!(plan(&rig(), twice, &[], &[]).unwrap().len(), 27);

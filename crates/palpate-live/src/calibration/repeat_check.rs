@@ -19,7 +19,7 @@ const MOST_REQUESTS: u32 = 2;
 
 /// Reason for a repeated request.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Doubt {
+pub enum RetakeReason {
     /// Slow change.
     Drift,
     /// Growth after the recording, without rest.
@@ -36,7 +36,7 @@ pub enum Doubt {
     },
 }
 
-impl fmt::Display for Doubt {
+impl fmt::Display for RetakeReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Drift => write!(f, "the reading drifted; no press was seen"),
@@ -60,14 +60,14 @@ pub struct TouchReading {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-struct PastPress {
+struct PreviousPress {
     position: Position,
     force_n: Option<f64>,
     depth_m: Option<f64>,
     touch: TouchReading,
 }
 
-impl PastPress {
+impl PreviousPress {
     fn is_repeat(&self, press: &Press) -> bool {
         self.position == press.position && self.force_n == press.force_n && self.depth_m == press.depth_m
     }
@@ -76,7 +76,7 @@ impl PastPress {
 /// Earlier presses.
 #[derive(Clone, Debug, Default)]
 pub struct RepeatCheck {
-    past: Vec<PastPress>,
+    previous: Vec<PreviousPress>,
     refused: Option<TouchReading>,
     requests: u32,
     /// Largest deviation of the removed last press; a lighter touch is doubtful.
@@ -108,7 +108,12 @@ impl RepeatCheck {
     /// Reason to request a press again.
     ///
     /// A second press that confirms the first is recorded.
-    pub fn doubt(&self, press: &Press, touch: &TouchReading, baseline: &Baseline) -> Option<Doubt> {
+    pub fn retake_reason(
+        &self,
+        press: &Press,
+        touch: &TouchReading,
+        baseline: &Baseline,
+    ) -> Option<RetakeReason> {
         let is_confirmed = self
             .refused
             .as_ref()
@@ -120,16 +125,16 @@ impl RepeatCheck {
         if let Some(share) = self.outgrown.as_ref().map(|outgrown| size / baseline.size_of(outgrown))
             && share * GROWTH < 1.0
         {
-            return Some(Doubt::Light { percent: 100.0 * share });
+            return Some(RetakeReason::Light { percent: 100.0 * share });
         }
-        let repeats = self.past.iter().filter(|past| past.is_repeat(press));
+        let repeats = self.previous.iter().filter(|past| past.is_repeat(press));
         // The other repeats may be wrong.
         let share = repeats.map(|past| self.excess_share(press, touch, &past.touch, baseline));
         if let Some(share) = share.min_by(f64::total_cmp) {
-            return (share > REPEAT_SHARE).then_some(Doubt::OffRepeats { percent: 100.0 * share });
+            return (share > REPEAT_SHARE).then_some(RetakeReason::OffRepeats { percent: 100.0 * share });
         }
         let share = size / self.smallest_size(baseline)?;
-        (share < LIGHT_SHARE).then_some(Doubt::Light { percent: 100.0 * share })
+        (share < LIGHT_SHARE).then_some(RetakeReason::Light { percent: 100.0 * share })
     }
 
     /// Relative difference from an earlier press, less hysteresis.
@@ -147,12 +152,12 @@ impl RepeatCheck {
 
     /// Smallest press, in standard deviations.
     pub fn smallest_size(&self, baseline: &Baseline) -> Option<f64> {
-        self.past.iter().map(|past| baseline.size_of(&past.touch.deviation)).min_by(f64::total_cmp)
+        self.previous.iter().map(|past| baseline.size_of(&past.touch.deviation)).min_by(f64::total_cmp)
     }
 
     /// Largest press, in standard deviations; 0 without presses.
     pub fn largest_size(&self, baseline: &Baseline) -> f64 {
-        self.past.iter().map(|past| baseline.size_of(&past.touch.deviation)).fold(0.0, f64::max)
+        self.previous.iter().map(|past| baseline.size_of(&past.touch.deviation)).fold(0.0, f64::max)
     }
 
     /// Adds a change between untouched rows.
@@ -171,12 +176,12 @@ impl RepeatCheck {
     /// Adds a press.
     pub fn record(&mut self, press: &Press, touch: TouchReading) {
         let Press { position, force_n, depth_m } = *press;
-        self.past.push(PastPress { position, force_n, depth_m, touch });
+        self.previous.push(PreviousPress { position, force_n, depth_m, touch });
         self.forget_request();
     }
 
     pub fn forget_last(&mut self) {
-        self.past.pop();
+        self.previous.pop();
         self.forget_request();
     }
 

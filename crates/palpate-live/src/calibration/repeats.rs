@@ -10,7 +10,7 @@ pub struct Place {
     /// Position.
     pub position: Position,
     /// Number of recorded presses.
-    pub taken: usize,
+    pub recorded: usize,
     /// Number of remaining presses.
     pub left: usize,
     /// Relative standard deviation in %; `None` for one press, or different forces.
@@ -32,9 +32,9 @@ pub fn places(rows: &[Row], to_come: &[Press]) -> Vec<Place> {
             rows.iter().enumerate().filter(|(_, row)| row.touches() && row.position == position).collect();
         Place {
             position,
-            taken: here.len(),
+            recorded: here.len(),
             left: to_come.iter().filter(|press| press.position == position).count(),
-            spread_percent: spread_percent(rows, &here),
+            spread_percent: range_percent(rows, &here),
         }
     };
     positions.into_iter().map(place).collect()
@@ -59,7 +59,7 @@ pub fn deviation_percent(rows: &[Row], at: usize) -> Option<f64> {
     (size > 0.0).then(|| 100.0 * distance(&press.reading, &mean) / size)
 }
 
-fn spread_percent(rows: &[Row], here: &[(usize, &Row)]) -> Option<f64> {
+fn range_percent(rows: &[Row], here: &[(usize, &Row)]) -> Option<f64> {
     let [(first_at, first), _, ..] = here else { return None };
     if here.iter().any(|(_, row)| !is_repeat(row, first)) {
         return None;
@@ -115,7 +115,7 @@ mod tests {
         let rows = [row(0.0, 0.0, [1.0, 1.0]), row(0.1, 2.0, [4.0, 5.0]), row(0.1, 2.0, [4.0, 5.1])];
         assert!((last_deviation_percent(&rows).unwrap() - 2.0).abs() < 1e-9);
         let places = places(&rows, &[press]);
-        assert_eq!((places[0].taken, places[0].left, places[1].taken, places[1].left), (2, 0, 0, 1));
+        assert_eq!((places[0].recorded, places[0].left, places[1].recorded, places[1].left), (2, 0, 0, 1));
         // Standard deviation 0.1 / √2.
         let spread = places[0].spread_percent.unwrap();
         assert!((spread - 100.0 * 0.1 / 2f64.sqrt() / 5.04).abs() < 0.01, "{spread}");

@@ -1,16 +1,16 @@
 //! Calibration in progress.
 
-use super::guide::{Guide, Progress, RestingRow, Waiting};
+use super::guide::{AwaitedStep, Guide, Progress, RestingRow};
 use super::journal::{Journal, JournalError};
 use super::press::Press;
-use super::repeat_check::Doubt;
+use super::repeat_check::RetakeReason;
 use super::repeats::untouched_before;
 use super::touch_off::TouchDetector;
 use super::trace::RecentReadings;
 use crate::event::{ChannelState, Event};
 use crate::feed::FeedWatch;
 use crate::frame::{BadFrame, Channel, ColumnsError, FrameReader};
-use crate::input::{Arrival, Arrived};
+use crate::input::{Arrival, TimedArrival};
 use crate::session::HealthWatch;
 use palpate_estimators::recording::Row;
 use palpate_estimators::setup::Setup;
@@ -51,7 +51,7 @@ pub enum Note {
     /// The source has ended.
     Ended,
     /// Another step is awaited.
-    Waits(Waiting),
+    Waits(AwaitedStep),
     /// A press is on disk.
     Taken,
     /// The last row was replaced by a firmer press.
@@ -61,7 +61,7 @@ pub enum Note {
     /// The source repeats readings, because its sensors are slower.
     RepeatedReadings,
     /// The press is requested again.
-    AskedAgain(Doubt),
+    AskedAgain(RetakeReason),
     /// Explanation of a long step.
     StillWaiting(String),
     /// Name of a saturated channel.
@@ -93,7 +93,7 @@ pub struct Calibration {
     is_guided: bool,
     touch_detector: Option<TouchDetector>,
     notes_repeats: bool,
-    explained: (Waiting, Duration),
+    explained: (AwaitedStep, Duration),
 }
 
 impl Calibration {
@@ -125,7 +125,7 @@ impl Calibration {
         frames.set_columns(columns)?;
         let guide = Guide::new(plan).with_rows(journal.rows());
         Ok(Self {
-            explained: (guide.waiting(), Duration::ZERO),
+            explained: (guide.awaited_step(), Duration::ZERO),
             guide,
             journal,
             frames,
@@ -189,7 +189,7 @@ impl Calibration {
     ///
     /// # Errors
     /// [`CalibrationError`] of a press.
-    pub fn receive(&mut self, arrived: &Arrived, notes: &mut Vec<Note>) -> Result<(), CalibrationError> {
+    pub fn receive(&mut self, arrived: &TimedArrival, notes: &mut Vec<Note>) -> Result<(), CalibrationError> {
         match &arrived.arrival {
             Arrival::Opened(name) | Arrival::Piped(name) | Arrival::Joined(name) => {
                 // The offsets of a reconnected board may have changed.
@@ -261,20 +261,20 @@ impl Calibration {
             Progress::Waits(waiting) => notes.push(Note::Waits(waiting)),
             Progress::AskedAgain(doubt) => notes.push(Note::AskedAgain(doubt)),
             Progress::TakenBack(doubt) => {
-                self.journal.take_back()?;
+                self.journal.remove_last_press()?;
                 notes.push(Note::AskedAgain(doubt));
             }
             Progress::Pressed { untouched, press } => {
                 if let Some(untouched) = untouched {
                     self.journal.add(self.without_cell(untouched.row), None)?;
                 }
-                let row = self.weighed(press)?;
+                let row = self.add_load_cell_force(press)?;
                 self.journal.add(row, depth_m)?;
                 self.trace_last_press();
                 notes.push(Note::Taken);
             }
             Progress::Replaced(press) => {
-                let row = self.weighed(press)?;
+                let row = self.add_load_cell_force(press)?;
                 self.journal.replace_last(row, depth_m)?;
                 self.trace_last_press();
                 notes.push(Note::Replaced);
@@ -297,18 +297,18 @@ impl Calibration {
     }
 
     fn explain(&mut self, at: Duration, notes: &mut Vec<Note>) {
-        let waiting = self.guide.waiting();
+        let waiting = self.guide.awaited_step();
         let (explained, since) = self.explained;
         if explained != waiting {
             self.explained = (waiting, at);
-        } else if waiting != Waiting::Press && at.saturating_sub(since) >= EXPLAIN_EVERY {
+        } else if waiting != AwaitedStep::Press && at.saturating_sub(since) >= EXPLAIN_EVERY {
             self.explained.1 = at;
             notes.extend(self.guide.explain().map(Note::StillWaiting));
         }
     }
 
     /// Adds the force of the load cell, as mean of the stretch.
-    fn weighed(&self, press: RestingRow) -> Result<Row, CalibrationError> {
+    fn add_load_cell_force(&self, press: RestingRow) -> Result<Row, CalibrationError> {
         let Some(cell) = &self.load_cell else { return Ok(press.row) };
         let force_n = press.mean.last().map_or(0.0, |read_n| read_n - self.cell_untouched_n());
         if force_n <= 0.0 {
@@ -349,7 +349,7 @@ impl Calibration {
         if !self.guide.redo() {
             return Ok(false);
         }
-        self.journal.take_back()?;
+        self.journal.remove_last_press()?;
         Ok(true)
     }
 

@@ -100,21 +100,21 @@ enum Work {
 #[derive(Debug)]
 pub(super) struct SetUp {
     stage: Stage,
-    asked: VecDeque<SetUpTask>,
+    requested: VecDeque<SetUpTask>,
     work: Option<Work>,
     has_ended: bool,
 }
 
 impl SetUp {
     pub fn new(stage: Stage) -> Self {
-        Self { stage, asked: VecDeque::new(), work: None, has_ended: false }
+        Self { stage, requested: VecDeque::new(), work: None, has_ended: false }
     }
 
     pub fn ask(&mut self, task: SetUpTask) {
         match task {
             // Ends any task, because finish lifts the finger.
             SetUpTask::End => self.has_ended = true,
-            task => self.asked.push_back(task),
+            task => self.requested.push_back(task),
         }
     }
 
@@ -123,7 +123,7 @@ impl SetUp {
     }
 
     pub fn is_idle(&self) -> bool {
-        self.work.is_none() && self.asked.is_empty()
+        self.work.is_none() && self.requested.is_empty()
     }
 
     pub fn is_between_tasks(&self) -> bool {
@@ -166,7 +166,7 @@ impl SetUp {
     }
 
     fn begin(&mut self, calibration: &mut Calibration) -> SetUpAction {
-        self.work = match self.asked.pop_front() {
+        self.work = match self.requested.pop_front() {
             None => None,
             Some(SetUpTask::End) => None,
             Some(SetUpTask::DryRun(places)) => {

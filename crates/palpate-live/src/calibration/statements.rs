@@ -30,7 +30,13 @@ impl Statements {
 
     /// Adds values from the rig and a file of presses.
     #[must_use]
-    pub fn or_known(self, rig: &Rig, force_n: Option<f64>, in_file_m: Option<f64>, before: &[Row]) -> Self {
+    pub fn with_known_values(
+        self,
+        rig: &Rig,
+        force_n: Option<f64>,
+        in_file_m: Option<f64>,
+        before: &[Row],
+    ) -> Self {
         let of_rig = rig.training.as_ref().and_then(|training| training.placement_sd_m);
         let first_n = Weights { force_n, second_n: None }.first_n(rig);
         let mut forces = before.iter().filter(|row| row.touches()).filter_map(|row| row.force_n);
@@ -113,7 +119,7 @@ kind = "influence"
         for answered in [
             Statements { second_force_n: Some(4.0), ..stated },
             Statements { force_is_known: true, ..stated },
-            stated.or_known(&rig, None, None, &[row(0.0), row(2.0), row(4.0)]),
+            stated.with_known_values(&rig, None, None, &[row(0.0), row(2.0), row(4.0)]),
         ] {
             assert_eq!(answered.single_weight_n(&rig, None), None, "{answered:?}");
         }
@@ -139,8 +145,9 @@ kind = "influence"
         let stated = Statements { placement_sd_m: Some(1e-3), ..Statements::default() };
         let with = Rig::from_toml(&BOARD.replace("count = 11", "count = 11\nplacement = \"2 mm\"")).unwrap();
         let without = Rig::from_toml(BOARD).unwrap();
-        let placement =
-            |stated: Statements, rig: &Rig| stated.or_known(rig, None, Some(3e-3), &[]).placement_sd_m;
+        let placement = |stated: Statements, rig: &Rig| {
+            stated.with_known_values(rig, None, Some(3e-3), &[]).placement_sd_m
+        };
         assert_eq!(placement(stated, &with), Some(1e-3));
         assert_eq!(placement(Statements::default(), &with), Some(2e-3));
         assert_eq!(placement(Statements::default(), &without), Some(3e-3));

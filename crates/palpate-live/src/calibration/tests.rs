@@ -1,7 +1,7 @@
 //! A simulated hand calibrates and checks a simulated strip in virtual time.
 
 use super::*;
-use crate::input::{Arrival, Arrived};
+use crate::input::{Arrival, TimedArrival};
 use crate::stamp::Stamp;
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::recording::{Recording, comment_with_placement};
@@ -23,25 +23,25 @@ impl Hand<'_> {
     /// Follows the requests of the guide until `until` is true, or no step remains.
     fn obey(&mut self, calibration: &mut Calibration, until: impl Fn(&Calibration) -> bool) {
         for _ in 0..20_000 {
-            if until(calibration) || calibration.guide().waiting() == Waiting::Nothing {
+            if until(calibration) || calibration.guide().awaited_step() == AwaitedStep::Nothing {
                 return;
             }
-            let contact = match calibration.guide().waiting() {
-                Waiting::Press | Waiting::Rest => {
+            let contact = match calibration.guide().awaited_step() {
+                AwaitedStep::Press | AwaitedStep::Rest => {
                     let press = calibration.guide().next_press().map(|(_, press)| press);
                     let force_n = |press: Press| press.force_n.unwrap_or(1.0);
                     press.map(|press| Contact { position: press.position, force_n: force_n(press) })
                 }
-                Waiting::Untouched | Waiting::Release | Waiting::Nothing => None,
+                AwaitedStep::Untouched | AwaitedStep::Release | AwaitedStep::Nothing => None,
             };
             let clean = self.bench.clean(contact.as_slice());
             let reading: Vec<String> = self.bench.measure(&clean).iter().map(f64::to_string).collect();
             self.at += EVERY;
             let arrival = Arrival::Bytes((reading.join(",") + "\n").into_bytes());
             let at = Stamp { elapsed: self.at, unix_ns: 0 };
-            calibration.receive(&Arrived { at, arrival }, &mut Vec::new()).unwrap();
+            calibration.receive(&TimedArrival { at, arrival }, &mut Vec::new()).unwrap();
         }
-        panic!("the calibration does not go on from {:?}", calibration.guide().waiting());
+        panic!("the calibration does not go on from {:?}", calibration.guide().awaited_step());
     }
 }
 
@@ -74,7 +74,7 @@ fn repeated_readings_count_once_for_the_noise() {
         for (i, reading) in frames.enumerate() {
             guide.add(Duration::from_millis((50 / times * i) as u64), reading);
             learnt = learnt.or_else(|| guide.untouched_reading().map(<[f64]>::to_vec));
-            if guide.waiting() != Waiting::Untouched {
+            if guide.awaited_step() != AwaitedStep::Untouched {
                 break;
             }
         }
@@ -112,7 +112,7 @@ fn the_limit_of_a_load_cell_counts_from_its_untouched_reading() {
                 let line = "0,".repeat(channels) + &format!("{cell_n}\n");
                 let at = Stamp { elapsed: EVERY * (i as u32 + 1), unix_ns: 0 };
                 let arrival = Arrival::Bytes(line.into_bytes());
-                calibration.receive(&Arrived { at, arrival }, &mut notes).unwrap();
+                calibration.receive(&TimedArrival { at, arrival }, &mut notes).unwrap();
             }
             let overload = |note| match note {
                 Note::Overload(force_n) => Some(force_n),
@@ -143,7 +143,7 @@ fn presses_are_struck_out_redone_fitted_and_checked() {
     hand.obey(&mut calibration, |_| false);
     let (journal, recording) = (calibration.journal(), read(&rig, &path));
     assert_eq!((journal.presses(), recording.touched().rows.len()), (14, 14));
-    assert!(places(journal.rows(), &[]).iter().all(|place| place.taken == 2));
+    assert!(places(journal.rows(), &[]).iter().all(|place| place.recorded == 2));
     let traces = journal.rows().iter().zip(journal.traces()).filter(|(row, _)| row.touches());
     for (row, trace) in traces {
         let points = &trace.as_ref().unwrap_or_else(|| panic!("a trace of {row:?}")).points;

@@ -154,7 +154,7 @@ impl TouchOff {
     pub fn next(&mut self, waited: Duration, detector: &mut TouchDetector) -> TouchOffAction {
         match self.step {
             Step::Learn => self.learn(waited, detector),
-            Step::Down { z_m } => self.look(z_m, detector),
+            Step::Down { z_m } => self.next_action(z_m, detector),
             Step::Return { size } => self.check_return(size, waited, detector),
             Step::Failed(failure) => TouchOffAction::Failed(failure),
         }
@@ -175,7 +175,7 @@ impl TouchOff {
         TouchOffAction::Lower(z_m)
     }
 
-    fn look(&mut self, z_m: f64, detector: &TouchDetector) -> TouchOffAction {
+    fn next_action(&mut self, z_m: f64, detector: &TouchDetector) -> TouchOffAction {
         match detector.contact() {
             Contact::Undecided => TouchOffAction::Wait,
             Contact::None if z_m <= self.lowest_m => {

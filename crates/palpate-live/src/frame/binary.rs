@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_are_stuffed_as_the_paper_says() {
+    fn bytes_are_stuffed_as_in_the_paper() {
         let stuffed = |bytes: &[u8]| {
             let mut to = Vec::new();
             stuff(bytes, &mut to);
@@ -129,7 +129,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_was_stuffed_comes_back(bytes in prop::collection::vec(prop_oneof![Just(0_u8), any::<u8>()], 0..600)) {
+        fn unstuffing_inverts_stuffing(bytes in prop::collection::vec(prop_oneof![Just(0_u8), any::<u8>()], 0..600)) {
             let (mut stuffed, mut back) = (Vec::new(), Vec::new());
             stuff(&bytes, &mut stuffed);
             prop_assert!(!stuffed.contains(&0));

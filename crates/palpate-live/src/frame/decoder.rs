@@ -17,7 +17,7 @@ pub struct Decoder {
     text: TextReader,
     form: Form,
     /// Bytes since the last frame end, or the last decided byte.
-    held: Vec<u8>,
+    buffer: Vec<u8>,
     /// Start of the last line in `held`, for an unknown form.
     line_start: usize,
     not_text: u64,
@@ -66,7 +66,7 @@ impl Decoder {
         Self {
             text: TextReader::new(Names::new(channels)),
             form: Form::Unknown,
-            held: Vec::new(),
+            buffer: Vec::new(),
             line_start: 0,
             not_text: 0,
             torn_line: false,
@@ -131,7 +131,7 @@ impl Decoder {
     /// Decodes headers in outdated bytes.
     pub fn receive_waiting(&mut self, bytes: &[u8]) {
         self.receive(bytes, |_| {});
-        if !self.held.is_empty() {
+        if !self.buffer.is_empty() {
             // The incomplete frame is outdated, too. A binary frame can contain a line end.
             self.clear();
             (self.skips, self.torn_binary) = (true, true);
@@ -145,7 +145,7 @@ impl Decoder {
 
     /// Bytes of the unfinished frame.
     pub fn unfinished(&self) -> &[u8] {
-        &self.held
+        &self.buffer
     }
 
     /// Decodes a message of whole lines or binary frames.
@@ -164,7 +164,7 @@ impl Decoder {
 
     /// Ends a stream with its last frame.
     pub fn end(&mut self, mut hand_on: impl FnMut(Result<Frame, BadFrame>)) {
-        let held = std::mem::take(&mut self.held);
+        let held = std::mem::take(&mut self.buffer);
         if !held.is_empty() && !self.skips {
             match self.form {
                 Form::Binary => self.read_binary(&held, &mut hand_on),
@@ -179,7 +179,7 @@ impl Decoder {
     }
 
     fn clear(&mut self) {
-        self.held.clear();
+        self.buffer.clear();
         (self.line_start, self.not_text) = (0, 0);
     }
 
@@ -197,13 +197,13 @@ impl Decoder {
         is_end: impl Fn(u8) -> bool,
         hand_on: &mut impl FnMut(Result<Frame, BadFrame>),
     ) -> (usize, bool) {
-        let room = longest.saturating_sub(self.held.len());
+        let room = longest.saturating_sub(self.buffer.len());
         let end = bytes.iter().take(room + 1).position(|byte| is_end(*byte));
         if end.is_none() && bytes.len() > room {
-            if self.held.is_empty() {
+            if self.buffer.is_empty() {
                 self.keep_bad(&bytes[..room]);
             } else {
-                let held = std::mem::take(&mut self.held);
+                let held = std::mem::take(&mut self.buffer);
                 self.keep_bad(&held);
             }
             hand_on(Err(BadFrame::TooLong));
@@ -212,13 +212,13 @@ impl Decoder {
             return (room + 1, false);
         }
         let content = &bytes[..end.unwrap_or(bytes.len())];
-        self.held.extend_from_slice(content);
+        self.buffer.extend_from_slice(content);
         (content.len() + usize::from(end.is_some()), end.is_some())
     }
 
     fn receive_text(&mut self, bytes: &[u8], hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) -> usize {
         // Most lines are whole in the bytes, and need no copy.
-        if self.held.is_empty()
+        if self.buffer.is_empty()
             && let Some(end) = find_line_end(&bytes[..bytes.len().min(LONGEST_LINE + 1)])
         {
             // The second byte of a line end makes an empty line, which is ignored.
@@ -229,12 +229,12 @@ impl Decoder {
         }
         let (taken, ends) = self.hold(bytes, LONGEST_LINE, |byte| is_line_end(&byte), hand_on);
         if ends {
-            let line = std::mem::take(&mut self.held);
+            let line = std::mem::take(&mut self.buffer);
             self.end_line(&line, bytes[taken - 1], hand_on);
-            if self.held.is_empty() {
+            if self.buffer.is_empty() {
                 // Reuses the allocation for the next line.
-                self.held = line;
-                self.held.clear();
+                self.buffer = line;
+                self.buffer.clear();
             }
         }
         taken
@@ -254,7 +254,7 @@ impl Decoder {
         }
         if is_binary {
             self.form = Form::Binary;
-            self.held = [&line[last + 1..], &[end]].concat();
+            self.buffer = [&line[last + 1..], &[end]].concat();
         } else {
             self.keep_bad(line);
             hand_on(Err(BadFrame::Encoding));
@@ -263,11 +263,11 @@ impl Decoder {
 
     fn receive_binary(&mut self, bytes: &[u8], hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) -> usize {
         let (taken, ends) = self.hold(bytes, binary::LONGEST, |byte| byte == 0, hand_on);
-        if ends && !self.held.is_empty() {
-            let frame = std::mem::take(&mut self.held);
+        if ends && !self.buffer.is_empty() {
+            let frame = std::mem::take(&mut self.buffer);
             self.read_binary(&frame, hand_on);
-            self.held = frame;
-            self.held.clear();
+            self.buffer = frame;
+            self.buffer.clear();
         }
         taken
     }
@@ -276,15 +276,15 @@ impl Decoder {
         let (taken, ends) = self.hold(bytes, LONGEST_LINE, |byte| is_line_end(&byte) || byte == 0, hand_on);
         if ends {
             match bytes[taken - 1] {
-                0 => self.judge_binary(hand_on),
-                end => self.judge_line(end, hand_on),
+                0 => self.classify_binary(hand_on),
+                end => self.classify_line(end, hand_on),
             }
         }
         taken
     }
 
-    fn judge_binary(&mut self, hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
-        let held = std::mem::take(&mut self.held);
+    fn classify_binary(&mut self, hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
+        let held = std::mem::take(&mut self.buffer);
         self.clear();
         let torn = std::mem::take(&mut self.torn_binary);
         if held.is_empty() {
@@ -305,8 +305,8 @@ impl Decoder {
     }
 
     /// The line end may be a byte of a binary frame.
-    fn judge_line(&mut self, end: u8, hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
-        let mut held = std::mem::take(&mut self.held);
+    fn classify_line(&mut self, end: u8, hand_on: &mut impl FnMut(Result<Frame, BadFrame>)) {
+        let mut held = std::mem::take(&mut self.buffer);
         let torn = std::mem::take(&mut self.torn_line);
         let line = &held[self.line_start..];
         let read = if is_text(line) { self.text.read(line) } else { Err(BadFrame::Encoding) };
@@ -326,7 +326,7 @@ impl Decoder {
                 self.keep_bad(&held[self.line_start..]);
                 held.push(end);
                 self.line_start = held.len();
-                self.held = held;
+                self.buffer = held;
                 return;
             }
             Err(_) if torn => {}
@@ -339,7 +339,7 @@ impl Decoder {
             // The line follows bytes that may be the start of a binary frame.
             held.push(end);
             self.line_start = held.len();
-            self.held = held;
+            self.buffer = held;
         }
     }
 
@@ -557,7 +557,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn how_bytes_are_cut_changes_nothing(
+        fn frames_do_not_depend_on_the_chunks(
             parts in prop::collection::vec(
                 prop_oneof![
                     Just(b"1.5,2\n".to_vec()),

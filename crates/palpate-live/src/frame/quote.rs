@@ -9,7 +9,7 @@ pub fn quote(bytes: &[u8]) -> String {
     let mut quotation = String::new();
     let mut length = 0;
     for chunk in bytes.utf8_chunks() {
-        let shown = chunk.valid().chars().map(shown);
+        let shown = chunk.valid().chars().map(printable);
         let escaped = chunk.invalid().iter().map(|byte| format!("\\x{byte:02X}"));
         for part in shown.chain(escaped) {
             length += part.chars().count();
@@ -23,7 +23,7 @@ pub fn quote(bytes: &[u8]) -> String {
     quotation
 }
 
-fn shown(letter: char) -> String {
+fn printable(letter: char) -> String {
     let mut part = String::new();
     // Writing into a string cannot fail.
     let _ = match letter {

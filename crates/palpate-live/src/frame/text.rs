@@ -646,7 +646,7 @@ mod tests {
     }
 
     #[test]
-    fn blank_lines_and_comments_are_nothing() {
+    fn blank_lines_and_comments_are_ignored() {
         for line in ["", "  \r", "# 1,2", "\u{FEFF}"] {
             assert!(matches!(reader().read(line.as_bytes()), Ok(Line::Nothing)), "{line:?}");
         }

@@ -103,7 +103,7 @@ impl McapFile {
             data_checksum: None,
             channels: BTreeMap::new(),
         };
-        own.look_through()?;
+        own.scan_blocks()?;
         Ok(own)
     }
 
@@ -112,7 +112,7 @@ impl McapFile {
         self.locator.as_deref().map_err(fault)
     }
 
-    fn look_through(&mut self) -> Result<(), RecordingError> {
+    fn scan_blocks(&mut self) -> Result<(), RecordingError> {
         self.check_magic()?;
         let mut metadata = None;
         // False until the readings of the last chunk are counted, from the index or the decoded chunk.

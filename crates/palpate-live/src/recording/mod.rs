@@ -14,7 +14,7 @@ mod unpack;
 mod whole_record;
 
 pub use head::{Head, RecordedChannel};
-pub use reader::{Excerpt, PassedOver, Playback, Recorded, RecordingSummary, list, read, summary};
+pub use reader::{Excerpt, Playback, Recorded, RecordingSummary, SkippedData, list, read, summary};
 pub use recorder::{Recorder, RecordingStatus};
 pub use recover::{Recovery, recover};
 pub use switch::{RecordingSwitch, check_name};

@@ -129,7 +129,7 @@ struct Thinning {
     channels: Vec<RecordedChannel>,
     count: u64,
     samples: Vec<Value>,
-    last: Option<(Pending, Keep)>,
+    last: Option<(Pending, Retention)>,
     events: Vec<Value>,
 }
 
@@ -139,7 +139,7 @@ struct Pending {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Keep {
+enum Retention {
     Surely,
     AsTheLast,
 }
@@ -148,11 +148,14 @@ impl Thinning {
     fn add(&mut self, message: RawMessage) {
         match message.topic {
             0 => {
-                if let Some((pending, Keep::Surely)) = self.last.take() {
+                if let Some((pending, Retention::Surely)) = self.last.take() {
                     self.samples.extend(self.sample(&pending));
                 }
-                let keep =
-                    if self.count.is_multiple_of(self.stride) { Keep::Surely } else { Keep::AsTheLast };
+                let keep = if self.count.is_multiple_of(self.stride) {
+                    Retention::Surely
+                } else {
+                    Retention::AsTheLast
+                };
                 self.count += 1;
                 self.last = Some((Pending { reading: message, estimate: None }, keep));
             }
@@ -173,7 +176,7 @@ impl Thinning {
     }
 
     fn sample(&self, pending: &Pending) -> Option<Value> {
-        let reading: ReadingIn = serde_json::from_slice(&pending.reading.data).ok()?;
+        let reading: StoredReading = serde_json::from_slice(&pending.reading.data).ok()?;
         let mut sample = Map::new();
         sample.insert("number".to_owned(), reading.number.into());
         sample.insert("time_s".to_owned(), (pending.reading.unix_ns as f64 * 1e-9).into());
@@ -189,12 +192,12 @@ impl Thinning {
 }
 
 #[derive(Deserialize)]
-struct ReadingIn {
+struct StoredReading {
     number: u64,
     values: Map<String, Value>,
 }
 
-impl ReadingIn {
+impl StoredReading {
     fn in_order(&self, channels: &[RecordedChannel]) -> Option<Vec<f64>> {
         channels.iter().map(|channel| self.values.get(&channel.name)?.as_f64()).collect()
     }
@@ -238,12 +241,12 @@ pub struct Playback {
     file: McapFile,
     block: usize,
     messages: std::vec::IntoIter<RawMessage>,
-    passed_over: PassedOver,
+    skipped: SkippedData,
 }
 
 /// Skipped blocks and messages of a playback.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct PassedOver {
+pub struct SkippedData {
     /// Unreadable blocks.
     pub blocks: u64,
     /// Readings in unreadable blocks, if an index counts them.
@@ -258,7 +261,7 @@ pub struct PassedOver {
     pub is_altered: bool,
 }
 
-impl PassedOver {
+impl SkippedData {
     /// Describes the unreadable data.
     pub fn loss(&self) -> Option<String> {
         let blocks = (self.blocks > 0).then(|| {
@@ -283,8 +286,8 @@ impl Playback {
     /// An unreadable file, or not a recording.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let mut file = McapFile::open(path)?;
-        let passed_over = PassedOver { is_altered: !file.check_loose()?, ..PassedOver::default() };
-        Ok(Self { file, block: 0, messages: Vec::new().into_iter(), passed_over })
+        let passed_over = SkippedData { is_altered: !file.check_loose()?, ..SkippedData::default() };
+        Ok(Self { file, block: 0, messages: Vec::new().into_iter(), skipped: passed_over })
     }
 
     /// Head.
@@ -306,8 +309,8 @@ impl Playback {
     }
 
     /// Skipped data.
-    pub fn passed_over(&self) -> &PassedOver {
-        &self.passed_over
+    pub fn skipped(&self) -> &SkippedData {
+        &self.skipped
     }
 
     /// Reads the next message.
@@ -318,7 +321,7 @@ impl Playback {
         while let Some(message) = self.next_message()? {
             match self.understand(&message) {
                 Some(recorded) => return Ok(Some(recorded)),
-                None => self.passed_over.messages += 1,
+                None => self.skipped.messages += 1,
             }
         }
         Ok(None)
@@ -333,12 +336,12 @@ impl Playback {
             self.block += 1;
             let found = self.file.messages(&block)?;
             if let Some(fault) = found.fault {
-                self.passed_over.blocks += 1;
-                self.passed_over.readings += block.readings;
-                self.passed_over.fault.get_or_insert(fault);
+                self.skipped.blocks += 1;
+                self.skipped.readings += block.readings;
+                self.skipped.fault.get_or_insert(fault);
             }
-            self.passed_over.foreign += found.foreign;
-            self.passed_over.messages += found.unknown;
+            self.skipped.foreign += found.foreign;
+            self.skipped.messages += found.unknown;
             self.messages = found.messages.into_iter();
         }
     }
@@ -347,7 +350,7 @@ impl Playback {
         let (unix_ns, data) = (message.unix_ns, &message.data);
         match message.topic {
             0 => {
-                let reading: ReadingIn = serde_json::from_slice(data).ok()?;
+                let reading: StoredReading = serde_json::from_slice(data).ok()?;
                 let values = reading.in_order(&self.file.head.channels)?;
                 Some(Recorded::Reading { number: reading.number, unix_ns, values })
             }

@@ -123,15 +123,15 @@ fn lock(status: &Mutex<RecordingStatus>) -> std::sync::MutexGuard<'_, RecordingS
 }
 
 #[derive(Clone, Debug, Default)]
-struct Encoded(Arc<Mutex<Vec<u8>>>);
+struct SharedBuffer(Arc<Mutex<Vec<u8>>>);
 
-impl Encoded {
+impl SharedBuffer {
     fn take(&self) -> Vec<u8> {
         std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
-impl Write for Encoded {
+impl Write for SharedBuffer {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(bytes);
         Ok(bytes.len())
@@ -144,8 +144,8 @@ impl Write for Encoded {
 
 /// The MCAP writer writes into memory, which never fails; [`Tail`] writes the file.
 struct Recording<'a> {
-    writer: Writer<NoSeek<Encoded>>,
-    encoded: Encoded,
+    writer: Writer<NoSeek<SharedBuffer>>,
+    encoded: SharedBuffer,
     tail: Tail,
     subject: &'a Subject,
     names: Vec<(String, f64)>,
@@ -176,7 +176,7 @@ impl<'a> Recording<'a> {
         status: Arc<Mutex<RecordingStatus>>,
         reports: SyncSender<Input>,
     ) -> Result<Self, (Arc<Mutex<RecordingStatus>>, String)> {
-        let encoded = Encoded::default();
+        let encoded = SharedBuffer::default();
         let (writer, topics) = match begin_file(encoded.clone(), subject) {
             Ok(begun) => begun,
             Err(error) => return Err((status, RecordingError::Encode(error.to_string()).to_string())),
@@ -226,7 +226,7 @@ impl<'a> Recording<'a> {
         for output in &batch.outputs {
             if let Err(error) = self.add_output(output) {
                 self.health = Health::Gone;
-                self.trouble(&RecordingError::Encode(error.to_string()).to_string());
+                self.set_problem(&RecordingError::Encode(error.to_string()).to_string());
                 return;
             }
         }
@@ -269,7 +269,7 @@ impl<'a> Recording<'a> {
         }
         if let Err(error) = self.writer.flush() {
             self.health = Health::Gone;
-            return self.trouble(&RecordingError::Encode(error.to_string()).to_string());
+            return self.set_problem(&RecordingError::Encode(error.to_string()).to_string());
         }
         self.tail.push(&self.encoded.take());
         let now = Instant::now();
@@ -277,7 +277,7 @@ impl<'a> Recording<'a> {
             self.look_at = now + LOOK_EVERY;
             if !self.tail.is_there() {
                 self.health = Health::Gone;
-                return self.trouble("its file was removed; the recording has ended");
+                return self.set_problem("its file was removed; the recording has ended");
             }
         } else if self.health == Health::Full {
             return;
@@ -298,7 +298,7 @@ impl<'a> Recording<'a> {
             }
             (Err(error), Health::Well) => {
                 self.health = Health::Full;
-                self.trouble(&format!("cannot be written: {error}; it is tried again every second"));
+                self.set_problem(&format!("cannot be written: {error}; it is tried again every second"));
             }
             _ => {}
         }
@@ -320,7 +320,7 @@ impl<'a> Recording<'a> {
             return;
         }
         if let Err(error) = self.writer.finish() {
-            return self.trouble(&RecordingError::Encode(error.to_string()).to_string());
+            return self.set_problem(&RecordingError::Encode(error.to_string()).to_string());
         }
         self.tail.push(&self.encoded.take());
         self.health = Health::Well;
@@ -328,7 +328,7 @@ impl<'a> Recording<'a> {
         self.write();
     }
 
-    fn trouble(&self, problem: &str) {
+    fn set_problem(&self, problem: &str) {
         lock(&self.status).problem = Some(problem.to_owned());
         self.report(problem);
     }
@@ -341,7 +341,10 @@ impl<'a> Recording<'a> {
 }
 
 /// Written bytes never change.
-fn begin_file(encoded: Encoded, subject: &Subject) -> Result<(Writer<NoSeek<Encoded>>, [u16; 3]), McapError> {
+fn begin_file(
+    encoded: SharedBuffer,
+    subject: &Subject,
+) -> Result<(Writer<NoSeek<SharedBuffer>>, [u16; 3]), McapError> {
     let options = options(&subject.head.version).disable_seeking(true);
     let mut writer = options.create(NoSeek::new(encoded))?;
     let topics = describe(&mut writer, &subject.head, Some(&subject.locator))?;

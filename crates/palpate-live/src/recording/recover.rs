@@ -1,7 +1,7 @@
 //! Recovery of damaged recordings.
 
 use super::recorder::{describe, options};
-use super::{PassedOver, Playback, RecordingError};
+use super::{Playback, RecordingError, SkippedData};
 use mcap::McapError;
 use mcap::records::MessageHeader;
 use palpate_files as whole_file;
@@ -21,7 +21,7 @@ pub struct Recovery {
     /// Fault that prevents a locator.
     pub locator_fault: Option<String>,
     /// Lost parts of the old file.
-    pub passed_over: PassedOver,
+    pub skipped: SkippedData,
 }
 
 /// Copies the readable messages of a recording into a new file.
@@ -72,6 +72,6 @@ fn copy(playback: &mut Playback, file: &mut File) -> Result<Recovery, CopyError>
         readings += u64::from(message.topic == 0);
     }
     writer.finish()?;
-    let (was_whole, passed_over) = (playback.is_whole(), playback.passed_over().clone());
-    Ok(Recovery { readings, messages, was_whole, locator_fault, passed_over })
+    let (was_whole, passed_over) = (playback.is_whole(), playback.skipped().clone());
+    Ok(Recovery { readings, messages, was_whole, locator_fault, skipped: passed_over })
 }

@@ -140,7 +140,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_say_the_time() {
+    fn names_contain_the_time() {
         assert_eq!(utc(0), "1970-01-01T00-00-00Z");
         // The leap day of a year divisible by 400, and the last second of a year.
         assert_eq!(utc(951_782_400), "2000-02-29T00-00-00Z");

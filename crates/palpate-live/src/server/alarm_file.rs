@@ -10,7 +10,7 @@ pub struct AlarmFile(PathBuf);
 
 impl AlarmFile {
     /// Returns `strip.alarms.toml` for a locator or rig `strip.json`.
-    pub fn beside(path: &Path) -> Self {
+    pub fn for_path(path: &Path) -> Self {
         Self(path.with_extension("alarms.toml"))
     }
 
@@ -60,7 +60,7 @@ mod tests {
     #[test]
     fn the_file_is_written_read_and_removed_with_the_last_rule() {
         let folder = tempfile::tempdir().unwrap();
-        let file = AlarmFile::beside(&folder.path().join("strip.locator.json"));
+        let file = AlarmFile::for_path(&folder.path().join("strip.locator.json"));
         assert_eq!(file.path(), folder.path().join("strip.locator.alarms.toml"));
         assert_eq!(file.read().unwrap(), "");
         file.write("# mine\n").unwrap();

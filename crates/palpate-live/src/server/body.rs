@@ -11,14 +11,14 @@ use serde::de::DeserializeOwned;
 
 /// Error answer: problem and remedy.
 #[derive(Debug)]
-pub struct Refusal {
+pub struct ErrorAnswer {
     status: StatusCode,
     error: String,
     help: &'static str,
     field: Option<&'static str>,
 }
 
-impl Refusal {
+impl ErrorAnswer {
     pub fn new(status: StatusCode, error: impl Into<String>, help: &'static str) -> Self {
         Self { status, error: error.into(), help, field: None }
     }
@@ -29,7 +29,7 @@ impl Refusal {
     }
 }
 
-impl IntoResponse for Refusal {
+impl IntoResponse for ErrorAnswer {
     fn into_response(self) -> Response {
         let mut body = serde_json::json!({ "error": self.error, "help": self.help });
         if let Some(field) = self.field {
@@ -51,36 +51,36 @@ impl<T: Serialize> IntoResponse for JsonAnswer<T> {
     }
 }
 
-async fn whole_body<S: Send + Sync>(request: Request, state: &S) -> Result<Bytes, Refusal> {
+async fn whole_body<S: Send + Sync>(request: Request, state: &S) -> Result<Bytes, ErrorAnswer> {
     let connection = request.extensions().get::<Connection>().cloned();
     let bytes = Bytes::from_request(request, state);
-    let Some(connection) = connection else { return bytes.await.map_err(|error| unread(&error)) };
+    let Some(connection) = connection else { return bytes.await.map_err(|error| unreadable_body(&error)) };
     let Ok(bytes) = tokio::time::timeout(connection.body_within, bytes).await else {
         let error = format!("the body did not come within {} s", connection.body_within.as_secs_f64());
-        return Err(Refusal::new(
+        return Err(ErrorAnswer::new(
             StatusCode::REQUEST_TIMEOUT,
             error,
             "send as many bytes as Content-Length states",
         ));
     };
     connection.note_whole_request();
-    bytes.map_err(|error| unread(&error))
+    bytes.map_err(|error| unreadable_body(&error))
 }
 
-fn unread(error: &BytesRejection) -> Refusal {
-    Refusal::new(error.status(), error.body_text(), "send at most 64 kB of JSON")
+fn unreadable_body(error: &BytesRejection) -> ErrorAnswer {
+    ErrorAnswer::new(error.status(), error.body_text(), "send at most 64 kB of JSON")
 }
 
 /// Body with a JSON object.
 pub struct JsonBody<T>(pub T);
 
 impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
-    type Rejection = Refusal;
+    type Rejection = ErrorAnswer;
 
-    async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {
+    async fn from_request(request: Request, state: &S) -> Result<Self, ErrorAnswer> {
         let bytes = whole_body(request, state).await?;
         let refused = |error: String| {
-            Refusal::new(StatusCode::BAD_REQUEST, error, "docs/reference/server.md describes the body")
+            ErrorAnswer::new(StatusCode::BAD_REQUEST, error, "docs/reference/server.md describes the body")
         };
         let body = serde_json::from_slice(&bytes).map_err(|error| refused(error.to_string()))?;
         // serde accepts a list of values as a struct.

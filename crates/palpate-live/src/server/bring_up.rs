@@ -63,7 +63,8 @@ pub struct BringUpRecord {
     baud: Option<u32>,
     ports: Vec<PortRecord>,
     #[serde(flatten)]
-    seen: MonitorRecord,
+    #[serde(rename = "seen")]
+    monitor: MonitorRecord,
 }
 
 /// Board without a rig.
@@ -74,10 +75,10 @@ pub struct BringUp {
 
 struct State {
     from: SourceUrl,
-    watched: Option<Watched>,
+    watched: Option<WatchedSource>,
 }
 
-struct Watched {
+struct WatchedSource {
     monitor: Arc<Mutex<Monitor>>,
     inputs: SyncSender<Input>,
     thread: JoinHandle<()>,
@@ -87,7 +88,7 @@ struct Watched {
 impl BringUp {
     /// Opens the source.
     pub fn begin(from: SourceUrl, folder: &Path, clock: HostClock) -> Result<Self, BringUpError> {
-        let watched = Some(Watched::open(&from, folder, clock)?);
+        let watched = Some(WatchedSource::open(&from, folder, clock)?);
         Ok(Self { clock, state: Mutex::new(State { from, watched }) })
     }
 
@@ -107,7 +108,7 @@ impl BringUp {
             SourceUrl::Serial { port, baud, .. } => (Some(port.display().to_string()), Some(*baud)),
             _ => (None, None),
         };
-        BringUpRecord { from: state.from.to_string(), port, baud, ports, seen }
+        BringUpRecord { from: state.from.to_string(), port, baud, ports, monitor: seen }
     }
 
     /// Opens another port or rate.
@@ -139,7 +140,7 @@ impl BringUp {
             watched.end();
         }
         state.from = SourceUrl::Serial { port, baud, columns };
-        state.watched = Some(Watched::open(&state.from, folder, self.clock)?);
+        state.watched = Some(WatchedSource::open(&state.from, folder, self.clock)?);
         Ok(())
     }
 
@@ -157,7 +158,7 @@ impl BringUp {
     }
 }
 
-impl Watched {
+impl WatchedSource {
     fn open(from: &SourceUrl, folder: &Path, clock: HostClock) -> Result<Self, BringUpError> {
         let (inputs, received) = sync_channel(WAITING);
         let monitor = Arc::<Mutex<Monitor>>::default();

@@ -2,12 +2,12 @@
 
 use super::lock::locked;
 use super::machine::{Attendance, MachineRecord, MachineState};
+use super::machine_run::{MachineRun, listen};
 use super::press_records::{CheckRecord, PressRecord, press_records};
-use super::pressing::{MachineRun, listen};
 use super::shared::Shared;
 use crate::calibration::{
-    Assessment, Calibration, Check, DepthKnowledge, Journal, JournalError, LONGEST_JOG_M, PlanError, Press,
-    SetUpTask, Statements, Trace, Waiting, check_path, check_presses, dry_run, places, plan,
+    Assessment, AwaitedStep, Calibration, Check, DepthKnowledge, Journal, JournalError, LONGEST_JOG_M,
+    PlanError, Press, SetUpTask, Statements, Trace, check_path, check_presses, dry_run, places, plan,
 };
 use crate::frame::{Channel, ColumnsError};
 use crate::input::Input;
@@ -154,9 +154,11 @@ enum Phase {
 #[derive(Clone, Debug, Serialize)]
 pub struct CalibrationRecord {
     phase: Phase,
-    waiting: Waiting,
+    #[serde(rename = "waiting")]
+    awaited: AwaitedStep,
     next: Option<PlaceRecord>,
-    taken: usize,
+    #[serde(rename = "taken")]
+    recorded: usize,
     left: usize,
     places: Vec<PlaceRecord>,
     last_percent: Option<f64>,
@@ -184,7 +186,8 @@ struct PlaceRecord {
     y_mm: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     force_n: Option<f64>,
-    taken: usize,
+    #[serde(rename = "taken")]
+    recorded: usize,
     left: usize,
     spread_percent: Option<f64>,
 }
@@ -438,7 +441,9 @@ impl Calibrator {
             running.purpose == Purpose::Check
                 && match running.by_machine {
                     true => running.thread.is_finished(),
-                    false => locked(&running.shared).calibration.guide().waiting() == Waiting::Nothing,
+                    false => {
+                        locked(&running.shared).calibration.guide().awaited_step() == AwaitedStep::Nothing
+                    }
                 }
         };
         let Some(running) = state.running.as_ref().filter(|running| is_over(running)) else { return false };
@@ -725,9 +730,9 @@ impl Calibrator {
         let extent = self.plan.rig.setup.surface().extent();
         let mut record = CalibrationRecord {
             phase: state.phase(),
-            waiting: Waiting::Nothing,
+            awaited: AwaitedStep::Nothing,
             next: None,
-            taken: 0,
+            recorded: 0,
             left: 0,
             places: Vec::new(),
             last_percent: None,
@@ -772,7 +777,7 @@ impl Calibrator {
         let (shared, extent) = (&*locked(&running.shared), self.plan.rig.setup.surface().extent());
         let calibration = &shared.calibration;
         let guide = calibration.guide();
-        record.waiting = guide.waiting();
+        record.awaited = guide.awaited_step();
         let next = guide.next_press();
         let left = next.map_or(guide.plan().len(), |(number, _)| number);
         let (rows, to_come) = match running.purpose {
@@ -836,8 +841,8 @@ impl State {
             Purpose::Check => Phase::Checking,
             Purpose::SetUp => Phase::SettingUp,
             Purpose::Press if running.by_machine => Phase::Pressing,
-            Purpose::Press => match locked(&running.shared).calibration.guide().waiting() {
-                Waiting::Nothing => Phase::Pressed,
+            Purpose::Press => match locked(&running.shared).calibration.guide().awaited_step() {
+                AwaitedStep::Nothing => Phase::Pressed,
                 _ => Phase::Pressing,
             },
         }
@@ -895,12 +900,12 @@ impl PlaceRecord {
 }
 
 fn write_places(rows: &[Row], to_come: &[Press], extent: Extent, record: &mut CalibrationRecord) {
-    record.taken = rows.iter().filter(|row| row.touches()).count();
+    record.recorded = rows.iter().filter(|row| row.touches()).count();
     record.left = to_come.len();
     let places = places(rows, to_come).into_iter();
     record.places = places
         .map(|place| PlaceRecord {
-            taken: place.taken,
+            recorded: place.recorded,
             left: place.left,
             spread_percent: place.spread_percent,
             ..PlaceRecord::of_position(place.position, extent)
@@ -980,7 +985,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_checked_before_a_fit_and_no_statement_is_taken_that_is_no_number() {
+    fn checks_need_a_fit_and_statements_need_numbers() {
         let folder = tempfile::tempdir().unwrap();
         let calibrator = calibrator(folder.path());
         let checked = calibrator.begin_check(|| panic!("the session goes on"));

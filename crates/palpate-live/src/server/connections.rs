@@ -47,13 +47,13 @@ fn most_files() -> usize {
 
 /// Limits on connections.
 #[derive(Clone, Copy, Debug)]
-pub struct Bounds {
+pub struct ConnectionLimits {
     head_within: Duration,
     body_within: Duration,
     most: usize,
 }
 
-impl Default for Bounds {
+impl Default for ConnectionLimits {
     fn default() -> Self {
         Self { head_within: HEAD_WITHIN, body_within: BODY_WITHIN, most: most_open() }
     }
@@ -74,7 +74,7 @@ impl Connection {
 }
 
 /// Serves connections forever.
-pub async fn serve(listener: TcpListener, router: Router, bounds: Bounds) -> Infallible {
+pub async fn serve(listener: TcpListener, router: Router, bounds: ConnectionLimits) -> Infallible {
     let mut open = Open::default();
     loop {
         match listener.accept().await {
@@ -121,18 +121,18 @@ impl Open {
         }
     }
 
-    fn take(&mut self, stream: TcpStream, router: Router, bounds: Bounds) {
+    fn take(&mut self, stream: TcpStream, router: Router, bounds: ConnectionLimits) {
         // Does not wait for acknowledgements.
         let _ = stream.set_nodelay(true);
         let connection =
             Connection { body_within: bounds.body_within, has_asked: Arc::new(AtomicBool::new(false)) };
-        let task = tokio::spawn(answer(stream, router, bounds.head_within, connection.clone()));
+        let task = tokio::spawn(serve_connection(stream, router, bounds.head_within, connection.clone()));
         self.0.push((task.abort_handle(), connection));
     }
 }
 
 /// Serves a connection until a WebSocket or the end.
-async fn answer(stream: TcpStream, router: Router, head_within: Duration, connection: Connection) {
+async fn serve_connection(stream: TcpStream, router: Router, head_within: Duration, connection: Connection) {
     let router = TowerToHyperService::new(router);
     let service = service_fn(move |mut request: Request<Incoming>| {
         if request.body().is_end_stream() {
@@ -159,7 +159,7 @@ mod tests {
 
     const GET: &str = "GET / HTTP/1.1\r\nHost: here\r\n\r\n";
 
-    fn served(bounds: Bounds) -> SocketAddr {
+    fn served(bounds: ConnectionLimits) -> SocketAddr {
         let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         listener.set_nonblocking(true).unwrap();
         let address = listener.local_addr().unwrap();
@@ -174,9 +174,9 @@ mod tests {
         address
     }
 
-    fn bounds() -> Bounds {
+    fn bounds() -> ConnectionLimits {
         let time = Duration::from_millis(300);
-        Bounds { head_within: time, body_within: time, most: 3 }
+        ConnectionLimits { head_within: time, body_within: time, most: 3 }
     }
 
     fn asked(address: SocketAddr, request: &str) -> std::net::TcpStream {
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_come_in_its_time_is_not_waited_for() {
+    fn late_requests_are_closed() {
         let address = served(bounds());
         for (request, answer) in [
             ("", ""),
@@ -212,7 +212,7 @@ mod tests {
 
     #[test]
     fn a_connection_too_many_closes_the_oldest_that_has_not_asked() {
-        let address = served(Bounds { head_within: Duration::from_secs(60), ..bounds() });
+        let address = served(ConnectionLimits { head_within: Duration::from_secs(60), ..bounds() });
         let whole = |stream: &mut std::net::TcpStream| {
             let mut answer = [0; 12];
             stream.read_exact(&mut answer).map(|()| assert_eq!(&answer, b"HTTP/1.1 200"))

@@ -1,6 +1,6 @@
 //! Guard: access control.
 
-use super::body::Refusal;
+use super::body::ErrorAnswer;
 use super::lock::locked;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
@@ -78,14 +78,14 @@ impl Access {
         Self { address: Some(address), ..self }
     }
 
-    fn check(&self, request: &Request) -> Result<(), Refusal> {
+    fn check(&self, request: &Request) -> Result<(), ErrorAnswer> {
         let headers = request.headers();
         check_single(headers)?;
         let host = text(headers, header::HOST).unwrap_or_default();
         // A request line with a whole URL also names the server.
         let authority = request.uri().authority().map(|authority| authority.as_str());
         if let Some(host) = [host].into_iter().chain(authority).find(|name| !self.is_own(name)) {
-            return Err(Refusal::new(
+            return Err(ErrorAnswer::new(
                 StatusCode::FORBIDDEN,
                 format!("this server is not called `{host}`"),
                 "call it by its address, or start it with --host-name NAME",
@@ -96,7 +96,7 @@ impl Access {
         if let (true, Some(origin)) = (changes || is_stream, text(headers, header::ORIGIN)) {
             let same = origin.split_once("://").is_some_and(|(_, rest)| rest.eq_ignore_ascii_case(host));
             if !same {
-                return Err(Refusal::new(
+                return Err(ErrorAnswer::new(
                     StatusCode::FORBIDDEN,
                     format!("a page of {origin} may not control this server"),
                     "open the page that this server itself serves",
@@ -104,8 +104,10 @@ impl Access {
             }
         }
         match &self.token {
-            Some(token) if !given(request).is_some_and(|given| equal(given.as_bytes(), token.as_bytes())) => {
-                Err(Refusal::new(
+            Some(token)
+                if !token_of(request).is_some_and(|given| equal(given.as_bytes(), token.as_bytes())) =>
+            {
+                Err(ErrorAnswer::new(
                     StatusCode::UNAUTHORIZED,
                     "the token is missing or wrong",
                     "give it as `?token=T`, or as the header `Authorization: Bearer T`",
@@ -132,11 +134,11 @@ impl Access {
 }
 
 /// Refuses repeated headers, which a proxy may interpret differently.
-fn check_single(headers: &HeaderMap) -> Result<(), Refusal> {
+fn check_single(headers: &HeaderMap) -> Result<(), ErrorAnswer> {
     let decisive = [header::HOST, header::ORIGIN, header::AUTHORIZATION];
     match decisive.iter().find(|name| headers.get_all(*name).iter().count() > 1) {
         None => Ok(()),
-        Some(name) => Err(Refusal::new(
+        Some(name) => Err(ErrorAnswer::new(
             StatusCode::BAD_REQUEST,
             format!("the request has more than one header `{name}`"),
             "send it once",
@@ -148,7 +150,7 @@ fn text(headers: &HeaderMap, name: HeaderName) -> Option<&str> {
     headers.get(name).map(|value| value.to_str().unwrap_or("?"))
 }
 
-fn given(request: &Request) -> Option<&str> {
+fn token_of(request: &Request) -> Option<&str> {
     let bearer =
         text(request.headers(), header::AUTHORIZATION).and_then(|value| value.strip_prefix("Bearer "));
     let query = request.uri().query().unwrap_or_default();
@@ -174,7 +176,7 @@ impl Guard {
         Self { access, posts: Mutex::new((Instant::now(), 0)) }
     }
 
-    fn check(&self, request: &Request) -> Result<(), Refusal> {
+    fn check(&self, request: &Request) -> Result<(), ErrorAnswer> {
         self.access.check(request)?;
         if request.method() != Method::POST || request.uri().path() == EMERGENCY_STOP {
             return Ok(());
@@ -186,7 +188,7 @@ impl Guard {
         posts.1 += 1;
         if posts.1 > POSTS_A_SECOND {
             let error = format!("more than {POSTS_A_SECOND} commands in a second");
-            return Err(Refusal::new(StatusCode::TOO_MANY_REQUESTS, error, "wait a second"));
+            return Err(ErrorAnswer::new(StatusCode::TOO_MANY_REQUESTS, error, "wait a second"));
         }
         Ok(())
     }
@@ -206,7 +208,7 @@ pub async fn guarded(State(guard): State<Arc<Guard>>, request: Request, next: Ne
 }
 
 impl Guard {
-    fn check_for(&self, request: &Request) -> Result<(), Refusal> {
+    fn check_for(&self, request: &Request) -> Result<(), ErrorAnswer> {
         if request.uri().path().starts_with("/api/") {
             return self.check(request);
         }

@@ -4,7 +4,7 @@ use super::alarm_file::AlarmFile;
 use super::bring_up::{BringUp, BringUpError, BringUpRecord};
 use super::calibration::{CalibrationPlan, CalibrationRecord, Calibrator, CalibratorError};
 use super::lock::locked;
-use super::rig_maker::{MadeRig, MadeRigRecord, RigForm, RigFormError};
+use super::rig_maker::{NewRig, NewRigRecord, RigForm, RigFormError};
 use super::session_info::SessionInfo;
 use super::web_sink::{Hub, WebSink};
 use crate::calibration::Statements;
@@ -402,7 +402,7 @@ impl Live {
         board.ok_or(BringUpError::HasRig)
     }
 
-    pub(super) fn seen(&self) -> Result<BringUpRecord, LiveError> {
+    pub(super) fn bring_up_record(&self) -> Result<BringUpRecord, LiveError> {
         Ok(self.board()?.record())
     }
 
@@ -414,9 +414,9 @@ impl Live {
     ///
     /// # Errors
     /// [`LiveError::BringUp`] or `RigForm`.
-    pub(super) fn make_rig(&self, form: &RigForm) -> Result<MadeRigRecord, LiveError> {
+    pub(super) fn make_rig(&self, form: &RigForm) -> Result<NewRigRecord, LiveError> {
         let board = self.board()?;
-        let mut made = MadeRig::new(form, &board.from(), &board.channels(), &self.folder)?;
+        let mut made = NewRig::new(form, &board.from(), &board.channels(), &self.folder)?;
         if !form.write {
             return Ok(made.record);
         }
@@ -430,7 +430,7 @@ impl Live {
             channels: Channel::all_of(&made.rig.setup),
             info: SessionInfo::of_setup(&made.rig.setup),
         });
-        *locked(&self.alarm_text) = (String::new(), Some(AlarmFile::beside(&made.out)));
+        *locked(&self.alarm_text) = (String::new(), Some(AlarmFile::for_path(&made.out)));
         let plan = CalibrationPlan {
             comment: format!("presses for {}", made.record.file),
             rig: made.rig,
@@ -544,7 +544,7 @@ impl Live {
 
     pub(super) fn past(&self) -> String {
         // Releases the lock early, because the session waits for it.
-        let past = locked(&self.hub.past).clone();
+        let past = locked(&self.hub.history).clone();
         past.to_json()
     }
 

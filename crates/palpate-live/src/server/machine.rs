@@ -61,8 +61,8 @@ pub struct MachineState {
     /// Instants of the first press and now, and presses in between.
     pressing_since: Option<Duration>,
     now: Duration,
-    taken: usize,
-    pub left_out: usize,
+    recorded: usize,
+    pub omitted: usize,
     at_m: Option<[f64; 3]>,
     pub touch_z_m: Option<f64>,
 }
@@ -77,7 +77,7 @@ impl MachineState {
         if self.position.is_some() {
             self.pressing_since.get_or_insert(now);
         }
-        self.taken += notes.iter().filter(|note| **note == Note::Taken).count();
+        self.recorded += notes.iter().filter(|note| **note == Note::Taken).count();
     }
 }
 
@@ -164,8 +164,8 @@ impl MachineRecord {
     ) -> Self {
         let left_s = state
             .pressing_since
-            .filter(|_| state.taken > 0)
-            .map(|since| state.now.saturating_sub(since).as_secs_f64() / state.taken as f64 * left as f64);
+            .filter(|_| state.recorded > 0)
+            .map(|since| state.now.saturating_sub(since).as_secs_f64() / state.recorded as f64 * left as f64);
         Self {
             firmware: state.firmware,
             stopping: state

@@ -9,13 +9,13 @@ mod bring_up;
 mod calibration;
 mod connections;
 mod guard;
+mod history;
 mod live;
 mod lock;
 mod machine;
+mod machine_run;
 mod page;
-mod past;
 mod press_records;
-mod pressing;
 mod rig_maker;
 mod routes;
 mod session_info;
@@ -76,7 +76,7 @@ impl Server {
         let run = move || {
             runtime.block_on(async {
                 tokio::select! {
-                    _ = connections::serve(listener, router, connections::Bounds::default()) => {}
+                    _ = connections::serve(listener, router, connections::ConnectionLimits::default()) => {}
                     _ = stopped => {}
                 }
             });

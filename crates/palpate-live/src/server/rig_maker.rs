@@ -143,10 +143,10 @@ impl RigFormError {
 
 /// Rig with its files.
 #[derive(Debug)]
-pub struct MadeRig {
+pub struct NewRig {
     pub rig: Rig,
     pub from: SourceUrl,
-    pub record: MadeRigRecord,
+    pub record: NewRigRecord,
     path: PathBuf,
     pub presses: PathBuf,
     pub out: PathBuf,
@@ -155,7 +155,7 @@ pub struct MadeRig {
 
 /// JSON record of a rig.
 #[derive(Clone, Debug, Serialize)]
-pub struct MadeRigRecord {
+pub struct NewRigRecord {
     pub file: String,
     pub text: String,
     /// Command for a later calibration.
@@ -166,7 +166,7 @@ pub struct MadeRigRecord {
     pub exists: Vec<String>,
 }
 
-impl MadeRig {
+impl NewRig {
     /// Creates the rig for a board with these channels.
     ///
     /// # Errors
@@ -189,7 +189,7 @@ impl MadeRig {
         let [file, presses_name, out_name] = names;
         let exists = [(&file, &path), (&out_name, &out)];
         let exists = exists.into_iter().filter(|(_, path)| is_there(path)).map(|(name, _)| name.clone());
-        let record = MadeRigRecord {
+        let record = NewRigRecord {
             exists: exists.collect(),
             command: command(form, &from, [&file, &presses_name, &out_name]),
             file,
@@ -360,7 +360,7 @@ fn point(place_mm: &[f64]) -> String {
 }
 
 /// Force range given by the presses alone, in the notation of a rig file.
-fn pressed_range(form: &RigForm) -> Option<String> {
+fn press_force_range(form: &RigForm) -> Option<String> {
     let forces_n = form.force_n.into_iter().chain(form.second_force_n);
     let (least_n, greatest_n) = ForceRange::of_presses(forces_n)?.ends_n();
     Some(format!("[\"{least_n} N\", \"{greatest_n} N\"]"))
@@ -390,7 +390,7 @@ fn text_of(form: &RigForm, channels: &[String]) -> Result<String, RigFormError> 
     line(format!("\n[recording]\nchannels = [{}]", names.join(", ")));
     if let Some(force) = force.as_ref().filter(|_| form.force_is_known) {
         line(format!("\n[contact]\nforce = {force}  # of every contact"));
-    } else if let Some(range) = pressed_range(form) {
+    } else if let Some(range) = press_force_range(form) {
         line(format!(
             "\n# [contact]\n# force_range = {range}  # where forces in use are known better than this"
         ));
@@ -452,7 +452,7 @@ mod tests {
     #[test]
     fn makes_a_rig_of_a_line_whose_source_names_its_values() {
         let folder = tempfile::tempdir().unwrap();
-        let made = MadeRig::new(&form(), &serial(), &sent(), folder.path()).unwrap();
+        let made = NewRig::new(&form(), &serial(), &sent(), folder.path()).unwrap();
         let channels = crate::frame::Channel::all_of(&made.rig.setup);
         let labels: Vec<&str> = channels.iter().map(|channel| channel.label.as_str()).collect();
         assert_eq!(labels, ["left", "right \"b\""]);
@@ -472,7 +472,7 @@ mod tests {
             ..form()
         };
         let named = (vec!["a".to_owned(), "b".to_owned()], true);
-        let made = MadeRig::new(&plane, &serial(), &named, Path::new("")).unwrap();
+        let made = NewRig::new(&plane, &serial(), &named, Path::new("")).unwrap();
         assert_eq!(plan(&made.rig, Weights::default(), &[], &[]).unwrap().len(), 30);
         assert_eq!((made.rig.setup.force_n(), made.from), (Some(2.0), serial()));
     }
@@ -485,7 +485,7 @@ mod tests {
             sensor_places_mm: Some(vec![vec![50.0], vec![], vec![250.0]]),
             ..form()
         };
-        let made = MadeRig::new(&whole, &serial(), &sent(), Path::new("")).unwrap();
+        let made = NewRig::new(&whole, &serial(), &sent(), Path::new("")).unwrap();
         let sensors = made.rig.setup.layout().sensors();
         let places_m: Vec<f64> = sensors.iter().map(|sensor| sensor.position.x_m).collect();
         assert_eq!(places_m, [0.05, 0.25]);
@@ -506,14 +506,14 @@ mod tests {
             sensor_places_mm: Some(vec![vec![50.0, 20.0], vec![], vec![250.0, 100.0]]),
             ..form()
         };
-        let made = MadeRig::new(&plane, &serial(), &sent(), Path::new("")).unwrap();
+        let made = NewRig::new(&plane, &serial(), &sent(), Path::new("")).unwrap();
         assert_eq!(made.rig.setup.layout().sensors()[1].position, Position { x_m: 0.25, y_m: 0.1 });
     }
 
     #[test]
     fn rig_without_a_force_asks_for_presses_of_unknown_force() {
         let made =
-            MadeRig::new(&RigForm { force_n: None, ..form() }, &serial(), &sent(), Path::new("")).unwrap();
+            NewRig::new(&RigForm { force_n: None, ..form() }, &serial(), &sent(), Path::new("")).unwrap();
         let presses = plan(&made.rig, made.statements.weights(None), &[], &[]).unwrap();
         assert!(presses.len() == 20 && presses.iter().all(|press| press.force_n.is_none()), "{presses:?}");
         assert!(!made.record.text.contains("force"), "{}", made.record.text);
@@ -524,7 +524,7 @@ mod tests {
         let field = |change: fn(&mut RigForm)| {
             let mut form = form();
             change(&mut form);
-            let refused = MadeRig::new(&form, &serial(), &sent(), Path::new("")).unwrap_err();
+            let refused = NewRig::new(&form, &serial(), &sent(), Path::new("")).unwrap_err();
             refused.field().unwrap_or_else(|| panic!("{refused}"))
         };
         assert_eq!(field(|form| form.file = "../a".to_owned()), "file");
@@ -547,7 +547,7 @@ mod tests {
     #[test]
     fn refuses_to_replace_files_without_a_word_and_presses_altogether() {
         let folder = tempfile::tempdir().unwrap();
-        let made = || MadeRig::new(&form(), &serial(), &sent(), folder.path()).unwrap();
+        let made = || NewRig::new(&form(), &serial(), &sent(), folder.path()).unwrap();
         std::fs::write(folder.path().join("strip.toml"), "mine").unwrap();
         assert_eq!(made().record.exists, ["strip.toml"]);
         assert!(matches!(made().write(false), Err(RigFormError::Exists { .. })));
@@ -563,13 +563,13 @@ mod tests {
         let refused = |change: fn(&mut RigForm)| {
             let mut form = form();
             change(&mut form);
-            MadeRig::new(&form, &serial(), &sent(), Path::new("")).unwrap_err().to_string()
+            NewRig::new(&form, &serial(), &sent(), Path::new("")).unwrap_err().to_string()
         };
         for name in
             ["../a.toml", "/a.toml", "a/b.toml", ".toml", "..toml", ".a.toml", "a.txt", "a b.toml", "-a.toml"]
         {
             let form = RigForm { file: name.to_owned(), ..form() };
-            let made = MadeRig::new(&form, &serial(), &sent(), Path::new(""));
+            let made = NewRig::new(&form, &serial(), &sent(), Path::new(""));
             assert!(matches!(made, Err(RigFormError::Name { .. })), "{name}");
         }
         assert!(refused(|form| form.length_mm = -1.0).contains("length"));
@@ -582,11 +582,11 @@ mod tests {
         assert!(refused(|form| form.channels[2] = "left".to_owned()).len() > 5);
         assert!(refused(|form| form.channels[2] = "a,b".to_owned()).contains("separates"));
         let named = (vec!["a".to_owned(), "b".to_owned(), "c".to_owned()], true);
-        let made = MadeRig::new(&form(), &serial(), &named, Path::new(""));
+        let made = NewRig::new(&form(), &serial(), &named, Path::new(""));
         assert!(matches!(made, Err(RigFormError::Renamed { .. })));
         let replay = "file:a.mcap".parse().unwrap();
         assert!(matches!(
-            MadeRig::new(&form(), &replay, &sent(), Path::new("")),
+            NewRig::new(&form(), &replay, &sent(), Path::new("")),
             Err(RigFormError::LeftOut { .. })
         ));
     }

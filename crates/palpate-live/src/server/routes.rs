@@ -1,12 +1,12 @@
 //! Routes of the server.
 
-use super::body::{JsonAnswer, JsonBody, Refusal};
+use super::body::{ErrorAnswer, JsonAnswer, JsonBody};
 use super::bring_up::{BringUpError, BringUpRecord};
 use super::calibration::{CalibrationRecord, CalibratorError};
 use super::guard::{Access, EMERGENCY_STOP, Guard, guarded};
 use super::live::{Live, LiveError};
 use super::press_records::PressRecord;
-use super::rig_maker::{MadeRigRecord, RigForm, RigFormError};
+use super::rig_maker::{NewRigRecord, RigForm, RigFormError};
 use super::session_info::SessionInfo;
 use super::{page, stream};
 use crate::calibration::{SetUpTask, Statements};
@@ -26,7 +26,7 @@ use std::sync::Arc;
 const MOST_BYTES: usize = 1 << 16;
 const MOST_OF_A_MARK: usize = 200;
 
-type Answer = Result<JsonAnswer<Value>, Refusal>;
+type Answer = Result<JsonAnswer<Value>, ErrorAnswer>;
 
 /// All routes, guarded.
 pub fn router(access: Access, live: Arc<Live>) -> Router {
@@ -68,9 +68,9 @@ async fn history(State(live): State<Arc<Live>>) -> Response {
 
 /// Object with ignored fields.
 #[derive(Deserialize)]
-struct Nothing {}
+struct EmptyBody {}
 
-async fn tare(State(live): State<Arc<Live>>, JsonBody(Nothing {}): JsonBody<Nothing>) -> Answer {
+async fn tare(State(live): State<Arc<Live>>, JsonBody(EmptyBody {}): JsonBody<EmptyBody>) -> Answer {
     done(live.command(Command::Tare))
 }
 
@@ -85,7 +85,7 @@ async fn mark(State(live): State<Arc<Live>>, JsonBody(Mark { text }): JsonBody<M
         let error = format!(
             "a mark has {length} characters; it must have 1 to {MOST_OF_A_MARK}, without control characters"
         );
-        return Err(Refusal::new(StatusCode::BAD_REQUEST, error, "write less, on one line"));
+        return Err(ErrorAnswer::new(StatusCode::BAD_REQUEST, error, "write less, on one line"));
     }
     done(live.command(Command::Mark(text)))
 }
@@ -103,7 +103,7 @@ struct AlarmRules {
 async fn set_alarms(
     State(live): State<Arc<Live>>,
     JsonBody(AlarmRules { text }): JsonBody<AlarmRules>,
-) -> Result<JsonAnswer<Value>, Refusal> {
+) -> Result<JsonAnswer<Value>, ErrorAnswer> {
     let setting = Arc::clone(&live);
     blocking(move || setting.set_alarms(&text)).await?;
     Ok(alarms(State(live)).await)
@@ -117,7 +117,7 @@ struct Source {
 async fn source(State(live): State<Arc<Live>>, JsonBody(Source { url }): JsonBody<Source>) -> Answer {
     live.check_source_is_free().map_err(|error| refusal(&error))?;
     if url != "simulated" {
-        return Err(Refusal::new(
+        return Err(ErrorAnswer::new(
             StatusCode::FORBIDDEN,
             "a browser may choose the source `simulated` only",
             "name other sources by `palpate serve LOCATOR --from URL`",
@@ -127,9 +127,9 @@ async fn source(State(live): State<Arc<Live>>, JsonBody(Source { url }): JsonBod
     blocking(move || live.begin_simulated()).await.map(|()| JsonAnswer(json!({})))
 }
 
-async fn bring_up(State(live): State<Arc<Live>>) -> Result<JsonAnswer<BringUpRecord>, Refusal> {
+async fn bring_up(State(live): State<Arc<Live>>) -> Result<JsonAnswer<BringUpRecord>, ErrorAnswer> {
     // Listing the ports is slow.
-    blocking(move || live.seen()).await.map(JsonAnswer)
+    blocking(move || live.bring_up_record()).await.map(JsonAnswer)
 }
 
 #[derive(Deserialize)]
@@ -141,10 +141,10 @@ struct Port {
 async fn choose_port(
     State(live): State<Arc<Live>>,
     JsonBody(Port { port, baud }): JsonBody<Port>,
-) -> Result<JsonAnswer<BringUpRecord>, Refusal> {
+) -> Result<JsonAnswer<BringUpRecord>, ErrorAnswer> {
     blocking(move || {
         live.choose_port(port.as_deref(), baud)?;
-        live.seen()
+        live.bring_up_record()
     })
     .await
     .map(JsonAnswer)
@@ -153,12 +153,12 @@ async fn choose_port(
 async fn make_rig(
     State(live): State<Arc<Live>>,
     JsonBody(form): JsonBody<RigForm>,
-) -> Result<JsonAnswer<MadeRigRecord>, Refusal> {
+) -> Result<JsonAnswer<NewRigRecord>, ErrorAnswer> {
     // Waits for the end of the source and for the disk.
     blocking(move || live.make_rig(&form)).await.map(JsonAnswer)
 }
 
-async fn calibration(State(live): State<Arc<Live>>) -> Result<JsonAnswer<CalibrationRecord>, Refusal> {
+async fn calibration(State(live): State<Arc<Live>>) -> Result<JsonAnswer<CalibrationRecord>, ErrorAnswer> {
     // A step may have locked the state.
     blocking(move || {
         live.attend();
@@ -169,7 +169,9 @@ async fn calibration(State(live): State<Arc<Live>>) -> Result<JsonAnswer<Calibra
 }
 
 /// Separate from the state, because traces are long.
-async fn calibration_presses(State(live): State<Arc<Live>>) -> Result<JsonAnswer<Vec<PressRecord>>, Refusal> {
+async fn calibration_presses(
+    State(live): State<Arc<Live>>,
+) -> Result<JsonAnswer<Vec<PressRecord>>, ErrorAnswer> {
     blocking(move || Ok(live.calibrator()?.presses())).await.map(JsonAnswer)
 }
 
@@ -241,7 +243,7 @@ impl Calibrate {
 async fn calibrate(
     State(live): State<Arc<Live>>,
     JsonBody(wish): JsonBody<Calibrate>,
-) -> Result<JsonAnswer<CalibrationRecord>, Refusal> {
+) -> Result<JsonAnswer<CalibrationRecord>, ErrorAnswer> {
     // Waits for the end of a source, and for the disk.
     blocking(move || {
         live.attend();
@@ -269,7 +271,7 @@ fn done(result: Result<(), LiveError>) -> Answer {
     result.map(|()| JsonAnswer(json!({}))).map_err(|error| refusal(&error))
 }
 
-fn refusal(error: &LiveError) -> Refusal {
+fn refusal(error: &LiveError) -> ErrorAnswer {
     let (status, help) = match error {
         LiveError::NoLocator => (StatusCode::CONFLICT, "calibrate first: POST /api/calibration"),
         LiveError::NotCalibrating => (
@@ -342,7 +344,7 @@ fn refusal(error: &LiveError) -> Refusal {
         LiveError::RigForm(error) => error.field(),
         _ => None,
     };
-    Refusal::new(status, error.to_string(), help).with_field(field)
+    ErrorAnswer::new(status, error.to_string(), help).with_field(field)
 }
 
 #[derive(Deserialize)]
@@ -361,7 +363,7 @@ async fn record(State(live): State<Arc<Live>>, JsonBody(Record { on, name }): Js
     .map(JsonAnswer)
 }
 
-async fn recordings(State(live): State<Arc<Live>>) -> Result<JsonAnswer<Vec<RecordingSummary>>, Refusal> {
+async fn recordings(State(live): State<Arc<Live>>) -> Result<JsonAnswer<Vec<RecordingSummary>>, ErrorAnswer> {
     blocking(move || live.list_recordings()).await.map(JsonAnswer)
 }
 
@@ -379,9 +381,9 @@ async fn recording(
     State(live): State<Arc<Live>>,
     name: Result<Path<String>, PathRejection>,
     part: Result<Query<Part>, QueryRejection>,
-) -> Result<JsonAnswer<Excerpt>, Refusal> {
+) -> Result<JsonAnswer<Excerpt>, ErrorAnswer> {
     let Query(Part { from_s, to_s, points }) = part.map_err(|error| {
-        Refusal::new(StatusCode::BAD_REQUEST, error.body_text(), "write ?from_s=0&to_s=60&points=2000")
+        ErrorAnswer::new(StatusCode::BAD_REQUEST, error.body_text(), "write ?from_s=0&to_s=60&points=2000")
     })?;
     let name = name_in(name)?;
     let span_s = (from_s.unwrap_or(0.0), to_s.unwrap_or(f64::INFINITY));
@@ -395,7 +397,7 @@ const MOST_OF_A_FILE: u64 = 256 << 20;
 async fn recording_file(
     State(live): State<Arc<Live>>,
     name: Result<Path<String>, PathRejection>,
-) -> Result<Response, Refusal> {
+) -> Result<Response, ErrorAnswer> {
     let name = name_in(name)?;
     let path = live.recording_path(&name).map_err(|error| refusal(&error))?;
     let read = tokio::task::spawn_blocking(move || {
@@ -412,12 +414,12 @@ async fn recording_file(
                 [(CONTENT_TYPE, "application/octet-stream"), (CONTENT_DISPOSITION, as_file.as_str())];
             Ok((headers, bytes).into_response())
         }
-        Ok(Err(bytes)) => Err(Refusal::new(
+        Ok(Err(bytes)) => Err(ErrorAnswer::new(
             StatusCode::PAYLOAD_TOO_LARGE,
             format!("{name} has {bytes} bytes; at most {MOST_OF_A_FILE} are sent"),
             "copy it from the folder of recordings",
         )),
-        Err(error) => Err(Refusal::new(
+        Err(error) => Err(ErrorAnswer::new(
             StatusCode::NOT_FOUND,
             format!("{name} cannot be read: {error}"),
             "GET /api/recordings lists them",
@@ -427,26 +429,30 @@ async fn recording_file(
 
 async fn blocking<T: Send + 'static>(
     work: impl FnOnce() -> Result<T, LiveError> + Send + 'static,
-) -> Result<T, Refusal> {
+) -> Result<T, ErrorAnswer> {
     match tokio::task::spawn_blocking(work).await {
         Ok(done) => done.map_err(|error| refusal(&error)),
         Err(error) => {
-            Err(Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, error.to_string(), "start palpate again"))
+            Err(ErrorAnswer::new(StatusCode::INTERNAL_SERVER_ERROR, error.to_string(), "start palpate again"))
         }
     }
 }
 
-async fn unknown() -> Refusal {
-    Refusal::new(StatusCode::NOT_FOUND, "the request does not exist", "docs/reference/server.md lists them")
+async fn unknown() -> ErrorAnswer {
+    ErrorAnswer::new(
+        StatusCode::NOT_FOUND,
+        "the request does not exist",
+        "docs/reference/server.md lists them",
+    )
 }
 
 /// The header `Allow` lists the valid methods.
-async fn other_method(method: Method) -> Refusal {
+async fn other_method(method: Method) -> ErrorAnswer {
     let error = format!("{method} is not a method of this request");
-    Refusal::new(StatusCode::METHOD_NOT_ALLOWED, error, "docs/reference/server.md lists the methods")
+    ErrorAnswer::new(StatusCode::METHOD_NOT_ALLOWED, error, "docs/reference/server.md lists the methods")
 }
 
-fn name_in(path: Result<Path<String>, PathRejection>) -> Result<String, Refusal> {
+fn name_in(path: Result<Path<String>, PathRejection>) -> Result<String, ErrorAnswer> {
     let help = "write a name as GET /api/recordings has it";
-    path.map(|Path(name)| name).map_err(|error| Refusal::new(error.status(), error.body_text(), help))
+    path.map(|Path(name)| name).map_err(|error| ErrorAnswer::new(error.status(), error.body_text(), help))
 }

@@ -3,7 +3,7 @@
 use super::machine::MachineState;
 use crate::calibration::{Calibration, CalibrationError, Note, SetUpNote, SetUpTask, last_deviation_percent};
 use crate::feed::REPEATED_READINGS;
-use crate::input::Arrived;
+use crate::input::TimedArrival;
 use crate::stamp::HostClock;
 use std::collections::VecDeque;
 
@@ -22,7 +22,7 @@ pub struct Shared {
 }
 
 impl Shared {
-    pub fn receive(&mut self, arrived: &Arrived) -> Vec<Note> {
+    pub fn receive(&mut self, arrived: &TimedArrival) -> Vec<Note> {
         let mut notes = Vec::new();
         let received = self.calibration.receive(arrived, &mut notes);
         notes.iter().cloned().for_each(|note| self.take(note));
@@ -33,7 +33,7 @@ impl Shared {
     }
 
     /// Checks the source during silence.
-    pub fn look(&mut self) -> Vec<Note> {
+    pub fn check_source(&mut self) -> Vec<Note> {
         let mut notes = Vec::new();
         self.calibration.check_feed(self.clock.now().elapsed, &mut notes);
         notes.iter().cloned().for_each(|note| self.take(note));

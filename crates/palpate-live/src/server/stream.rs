@@ -1,6 +1,6 @@
 //! Stream of a session to a browser.
 
-use super::body::Refusal;
+use super::body::ErrorAnswer;
 use super::connections::most_open;
 use super::live::Live;
 use super::web_sink::{Hub, with_missed};
@@ -24,7 +24,7 @@ const PATIENCE: Duration = Duration::from_secs(30);
 
 /// Query of a stream.
 #[derive(Debug, Deserialize)]
-pub struct Wish {
+pub struct StreamQuery {
     #[serde(default)]
     form: Form,
     #[serde(default)]
@@ -51,17 +51,18 @@ enum Rate {
 /// Opens a stream.
 pub async fn stream(
     State(live): State<Arc<Live>>,
-    wish: Result<Query<Wish>, QueryRejection>,
+    wish: Result<Query<StreamQuery>, QueryRejection>,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
-) -> Result<Response, Refusal> {
+) -> Result<Response, ErrorAnswer> {
     const HELP: &str = "form is `json` or `binary`, rate is `60` or `all`; binary has all";
-    let Query(wish) = wish.map_err(|error| Refusal::new(StatusCode::BAD_REQUEST, error.body_text(), HELP))?;
-    let upgrade =
-        upgrade.map_err(|error| Refusal::new(error.status(), error.body_text(), "open it as a WebSocket"))?;
+    let Query(wish) =
+        wish.map_err(|error| ErrorAnswer::new(StatusCode::BAD_REQUEST, error.body_text(), HELP))?;
+    let upgrade = upgrade
+        .map_err(|error| ErrorAnswer::new(error.status(), error.body_text(), "open it as a WebSocket"))?;
     let hub = live.hub().clone();
     let Ok(place) = Arc::clone(&hub.places).try_acquire_owned() else {
         let error = format!("{} browsers follow this session already", most_open());
-        return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, error, "close one of them"));
+        return Err(ErrorAnswer::new(StatusCode::SERVICE_UNAVAILABLE, error, "close one of them"));
     };
     let upgrade = upgrade
         .max_message_size(MOST_BYTES)
@@ -69,12 +70,12 @@ pub async fn stream(
         .write_buffer_size(0)
         .max_write_buffer_size(MOST_WAITING);
     Ok(upgrade.on_upgrade(move |socket| async move {
-        follow(socket, &hub, &wish, &live).await;
+        stream_samples(socket, &hub, &wish, &live).await;
         drop(place);
     }))
 }
 
-async fn follow(mut socket: WebSocket, hub: &Hub, wish: &Wish, live: &Live) {
+async fn stream_samples(mut socket: WebSocket, hub: &Hub, wish: &StreamQuery, live: &Live) {
     match (wish.form, wish.rate) {
         (Form::Binary, _) => {
             let message = |packet: &Bytes, _| Message::Binary(packet.clone());

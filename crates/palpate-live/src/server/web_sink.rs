@@ -1,8 +1,8 @@
 //! Sink of browsers, which share the encoded messages.
 
 use super::connections::most_open;
+use super::history::History;
 use super::lock::locked;
-use super::past::Past;
 use crate::event::EventRecord;
 use crate::frame::Channel;
 use crate::sample::{Sample, SampleRecord};
@@ -29,7 +29,7 @@ pub struct Hub {
     pub(super) json: broadcast::Sender<Utf8Bytes>,
     pub(super) binary: broadcast::Sender<Bytes>,
     pub(super) places: Arc<Semaphore>,
-    pub(super) past: Arc<Mutex<Past>>,
+    pub(super) history: Arc<Mutex<History>>,
 }
 
 impl Default for Hub {
@@ -39,14 +39,14 @@ impl Default for Hub {
             json: broadcast::Sender::new(BATCHES),
             binary: broadcast::Sender::new(BATCHES),
             places: Arc::new(Semaphore::new(most_open())),
-            past: Arc::default(),
+            history: Arc::default(),
         }
     }
 }
 
 impl Hub {
     pub(super) fn forget_past(&self) {
-        *locked(&self.past) = Past::default();
+        *locked(&self.history) = History::default();
     }
 }
 
@@ -60,13 +60,13 @@ pub struct WebSink {
 }
 
 #[derive(Serialize)]
-struct Batched<'a> {
+struct BatchRecord<'a> {
     samples: Vec<SampleRecord>,
     events: Vec<&'a EventRecord>,
 }
 
 #[derive(Serialize)]
-struct Stated<'a> {
+struct SnapshotRecord<'a> {
     state: &'a StateRecord,
     samples: Vec<SampleRecord>,
     events: Vec<&'a EventRecord>,
@@ -80,7 +80,7 @@ impl WebSink {
     }
 
     fn keep(&self, batch: &Batch) {
-        let mut past = locked(&self.hub.past);
+        let mut past = locked(&self.hub.history);
         for output in &batch.outputs {
             match output {
                 Output::Sample(sample) => {
@@ -109,7 +109,9 @@ impl Sink for WebSink {
         }
         if self.hub.json.receiver_count() > 0 {
             let samples = batch.samples().map(|sample| self.record(sample)).collect();
-            if let Ok(text) = serde_json::to_string(&Batched { samples, events: batch.events().collect() }) {
+            if let Ok(text) =
+                serde_json::to_string(&BatchRecord { samples, events: batch.events().collect() })
+            {
                 // Fails without browsers.
                 let _ = self.hub.json.send(text.into());
             }
@@ -130,7 +132,7 @@ impl Sink for WebSink {
         let samples: Vec<&Sample> = recent.iter().flat_map(|batch| batch.samples()).collect();
         let samples = thinned(&samples).into_iter().map(|sample| self.record(sample)).collect();
         let events = recent.iter().flat_map(|batch| batch.events()).collect();
-        if let Ok(text) = serde_json::to_string(&Stated { state, samples, events, missed: 0 }) {
+        if let Ok(text) = serde_json::to_string(&SnapshotRecord { state, samples, events, missed: 0 }) {
             let _ = self.hub.states.send(text.into());
         }
     }

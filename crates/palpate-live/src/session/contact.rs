@@ -21,7 +21,7 @@ pub struct ContactWatch {
     state: State,
     recent: (State, u32),
     since: Option<Duration>,
-    told: (Position, Duration),
+    reported: (Position, Duration),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +38,7 @@ impl ContactWatch {
             state: State::Untouched,
             recent: (State::Untouched, 0),
             since: None,
-            told: (Position::default(), Duration::ZERO),
+            reported: (Position::default(), Duration::ZERO),
         }
     }
 
@@ -57,7 +57,7 @@ impl ContactWatch {
         if next != self.state && self.recent.1 >= needed {
             self.change(now, next, estimate, &mut tell);
         } else if next == self.state && touches(estimate.status) {
-            self.follow(now, &estimate.contact, &mut tell);
+            self.report_change(now, &estimate.contact, &mut tell);
         }
     }
 
@@ -82,20 +82,20 @@ impl ContactWatch {
                 {
                     tell(Event::SecondContact { contact: self.record(second) });
                 }
-                self.told = (estimate.contact.position, now);
+                self.reported = (estimate.contact.position, now);
             }
         }
     }
 
-    fn follow(&mut self, now: Duration, contact: &ContactEstimate, tell: &mut impl FnMut(Event)) {
-        let (position, at) = self.told;
+    fn report_change(&mut self, now: Duration, contact: &ContactEstimate, tell: &mut impl FnMut(Event)) {
+        let (position, at) = self.reported;
         let uncertain_m = contact.uncertainty.map_or(0.0, |u| {
             let across = |(low, high): (f64, f64)| 0.5 * (high - low);
             across(u.x_95_m).max(across(u.y_95_m))
         });
         let least_m = (MOVE * self.extent.length_m()).max(uncertain_m);
         if now.saturating_sub(at) >= BETWEEN_MOVES && position.distance_m(contact.position) > least_m {
-            self.told = (contact.position, now);
+            self.reported = (contact.position, now);
             tell(Event::Move { contact: self.record(contact) });
         }
     }

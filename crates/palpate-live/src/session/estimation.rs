@@ -1,6 +1,6 @@
 //! Estimation methods of a session.
 
-use super::follower::Follower;
+use super::estimate_tracker::EstimateTracker;
 use super::low_pass::LowPass;
 use palpate_core::Estimate;
 use palpate_estimators::estimator::{Creep, Drift, Locator, NotTrackable, Swing, TrackerConfig};
@@ -58,7 +58,7 @@ impl Estimation {
     ///
     /// # Errors
     /// [`SessionError`].
-    pub fn follower(&self, locator: &Locator) -> Result<Option<Follower>, SessionError> {
+    pub fn follower(&self, locator: &Locator) -> Result<Option<EstimateTracker>, SessionError> {
         let Self::Track { frequency_hz, creep } = self else { return Ok(None) };
         let range = "at least 0.000001 Hz and at most 1000000000 Hz";
         let numbers = frequency_hz.map(|frequency_hz| ("the natural frequency", frequency_hz));
@@ -75,14 +75,14 @@ impl Estimation {
         let creep = creep.map(|CreepConfig { share, time_s }| Creep { share, time_s });
         let drift = Some(Drift::default());
         let config = TrackerConfig { swing, drift, creep, ..TrackerConfig::default() };
-        Ok(Some(Follower::new(locator, config)?))
+        Ok(Some(EstimateTracker::new(locator, config)?))
     }
 }
 
 pub(super) enum EstimationState {
     Single,
     LowPass(LowPass),
-    Track(Box<Follower>),
+    Track(Box<EstimateTracker>),
 }
 
 impl EstimationState {
@@ -119,7 +119,7 @@ impl EstimationState {
                 }
                 locator.locate(tared).ok()
             }
-            Self::Track(follower) => Some(follower.follow(unix_ns, reading, tared, single)),
+            Self::Track(tracker) => Some(tracker.update(unix_ns, reading, tared, single)),
         }
     }
 }

@@ -1,22 +1,22 @@
 //! Sessions: from bytes to readings, estimates and events.
 
 mod contact;
+mod estimate_tracker;
 mod estimation;
-mod follower;
 mod health;
 mod low_pass;
 mod taring;
 mod timeline;
 
+pub use estimate_tracker::EstimateTracker;
 pub use estimation::{CreepConfig, Estimation, SessionError};
-pub use follower::Follower;
 pub use health::ChannelHealth;
 pub(crate) use health::HealthWatch;
 
 use crate::event::{Event, EventRecord};
 use crate::feed::REPEATED_READINGS;
 use crate::frame::{BadFrame, Channel, ColumnsError, Frame, FrameReader};
-use crate::input::{Arrival, Arrived, Command};
+use crate::input::{Arrival, Command, TimedArrival};
 use crate::sample::Sample;
 use crate::stamp::Stamp;
 use contact::ContactWatch;
@@ -154,10 +154,10 @@ impl<'a> Session<'a> {
     }
 
     /// Processes an arrival.
-    pub fn receive(&mut self, arrived: &Arrived, out: &mut Vec<Output>) {
+    pub fn receive(&mut self, arrived: &TimedArrival, out: &mut Vec<Output>) {
         let at = arrived.at;
-        if let Some(by_s) = self.timeline.look_at_clock(at) {
-            self.tell(at, Event::ClockSet { by_s }, out);
+        if let Some(by_s) = self.timeline.clock_step(at) {
+            self.push_event(at, Event::ClockSet { by_s }, out);
         }
         match &arrived.arrival {
             Arrival::Opened(name) | Arrival::Joined(name) | Arrival::Piped(name) => {
@@ -165,16 +165,16 @@ impl<'a> Session<'a> {
                 if matches!(arrived.arrival, Arrival::Piped(_)) {
                     self.timeline.follow_board();
                 }
-                self.tell(at, Event::SourceOpened { name: name.clone() }, out);
+                self.push_event(at, Event::SourceOpened { name: name.clone() }, out);
             }
-            Arrival::Lost(why) => self.tell(at, Event::SourceLost { why: why.clone() }, out),
+            Arrival::Lost(why) => self.push_event(at, Event::SourceLost { why: why.clone() }, out),
             Arrival::Backlog(_) | Arrival::Bytes(_) | Arrival::Message(_) | Arrival::Ended => {}
         }
         let frames = self.frames.receive(&arrived.arrival);
         let behind = (0..frames.len()).rev();
         frames.into_iter().zip(behind).for_each(|(frame, behind)| self.take(at, frame, behind, out));
         if arrived.arrival == Arrival::Ended {
-            self.tell(at, Event::SourceEnded, out);
+            self.push_event(at, Event::SourceEnded, out);
         }
     }
 
@@ -182,9 +182,9 @@ impl<'a> Session<'a> {
     pub fn command(&mut self, at: Stamp, command: Command, out: &mut Vec<Output>) {
         match command {
             Command::Tare => self.taring.begin(),
-            Command::Mark(text) => self.tell(at, Event::Mark { text }, out),
-            Command::Trouble(text) => self.tell(at, Event::Trouble { text }, out),
-            Command::Alarm { name, text } => self.tell(at, Event::Alarm { name, text }, out),
+            Command::Mark(text) => self.push_event(at, Event::Mark { text }, out),
+            Command::Trouble(text) => self.push_event(at, Event::Trouble { text }, out),
+            Command::Alarm { name, text } => self.push_event(at, Event::Alarm { name, text }, out),
         }
     }
 
@@ -198,7 +198,7 @@ impl<'a> Session<'a> {
             }
             self.gaps += 1;
             self.lost_frames += u64::from(gap.lost_frames.unwrap_or(0));
-            self.tell(at, Event::Gap { seconds: gap.seconds, lost_frames: gap.lost_frames }, out);
+            self.push_event(at, Event::Gap { seconds: gap.seconds, lost_frames: gap.lost_frames }, out);
         }
         let time_s = unix_ns as f64 * 1e-9;
         self.health.add(&frame.reading, |event| out.push(Output::Event(EventRecord { time_s, event })));
@@ -255,7 +255,7 @@ impl<'a> Session<'a> {
         is_repeat
     }
 
-    fn tell(&self, at: Stamp, event: Event, out: &mut Vec<Output>) {
+    fn push_event(&self, at: Stamp, event: Event, out: &mut Vec<Output>) {
         let time_s = self.timeline.unix_ns(at) as f64 * 1e-9;
         out.push(Output::Event(EventRecord { time_s, event }));
     }

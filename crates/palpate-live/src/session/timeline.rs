@@ -50,7 +50,7 @@ impl Timeline {
     }
 
     /// Seconds by which the wall clock was set.
-    pub fn look_at_clock(&mut self, at: Stamp) -> Option<f64> {
+    pub fn clock_step(&mut self, at: Stamp) -> Option<f64> {
         let offset_ns = offset_ns(at);
         if self.base_ns.is_none() {
             self.base_ns = Some(offset_ns);
@@ -177,7 +177,7 @@ mod tests {
     fn next(timeline: &mut Timeline, ms: u64, sequence: u32, device_ms: u64) -> (u64, Option<Gap>) {
         let elapsed = Duration::from_millis(ms);
         let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
-        timeline.look_at_clock(at);
+        timeline.clock_step(at);
         let device_time = Some(Duration::from_millis(device_ms));
         timeline.next(at, &Frame { reading: vec![], sequence: Some(sequence), device_time }, 0)
     }
@@ -189,7 +189,7 @@ mod tests {
         for (ms, frames) in bursts {
             let elapsed = Duration::from_millis(ms);
             let at = Stamp { elapsed, unix_ns: 1_800_000_000_000_000_000 + elapsed.as_nanos() as u64 };
-            timeline.look_at_clock(at);
+            timeline.clock_step(at);
             for behind in (0..frames).rev() {
                 let frame = Frame { reading: vec![], sequence: None, device_time: None };
                 let (unix_ns, _) = timeline.next(at, &frame, behind);

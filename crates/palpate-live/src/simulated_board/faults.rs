@@ -28,7 +28,7 @@ impl FaultConfig {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Fate {
+pub enum Delivery {
     Whole,
     Torn {
         /// Range of the missing bytes.
@@ -49,21 +49,21 @@ impl Faults {
     }
 
     /// Draws the fate of a frame of `length` bytes.
-    pub fn next(&mut self, length: usize) -> Fate {
+    pub fn next(&mut self, length: usize) -> Delivery {
         let FaultConfig { dropped, torn, .. } = self.config;
         if dropped <= 0.0 && torn <= 0.0 {
-            return Fate::Whole;
+            return Delivery::Whole;
         }
         let drawn: f64 = self.rng.random();
         if drawn < dropped {
-            Fate::Dropped
+            Delivery::Dropped
         } else if drawn < dropped + torn && length > 1 {
             // At least one byte stays, and at least one is lost.
             let start = self.rng.random_range(0..length);
             let most = if start == 0 { length - 1 } else { length - start };
-            Fate::Torn { lost: start..start + self.rng.random_range(1..=most) }
+            Delivery::Torn { lost: start..start + self.rng.random_range(1..=most) }
         } else {
-            Fate::Whole
+            Delivery::Whole
         }
     }
 }
@@ -79,12 +79,12 @@ mod tests {
         let (mut dropped, mut torn) = (0, 0);
         for _ in 0..10_000 {
             match faults.next(30) {
-                Fate::Dropped => dropped += 1,
-                Fate::Torn { lost } => {
+                Delivery::Dropped => dropped += 1,
+                Delivery::Torn { lost } => {
                     torn += 1;
                     assert!(!lost.is_empty() && lost.end <= 30 && lost.len() < 30, "{lost:?}");
                 }
-                Fate::Whole => {}
+                Delivery::Whole => {}
             }
         }
         assert!((900..1100).contains(&dropped) && (1850..2150).contains(&torn), "{dropped} {torn}");

@@ -16,7 +16,7 @@ pub struct Finger {
     touch: Touch,
     script: Option<Vec<Waypoint>>,
     /// `Some(None)` if lifted.
-    held: Option<Option<Contact>>,
+    set_by_stage: Option<Option<Contact>>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,7 +60,7 @@ impl Finger {
         let touch = Touch { from: nowhere, to: nowhere, force_n: 0.0, start_s: 0.0, end_s: 0.0 };
         let mut finger = Self {
             script: None,
-            held: None,
+            set_by_stage: None,
             // This random stream is independent of that of the noise.
             rng: Xoshiro256PlusPlus::seed_from_u64(seed ^ 0xF1_46E2),
             extent: rig.setup.surface().extent(),
@@ -74,7 +74,7 @@ impl Finger {
 
     /// Returns the contact at a time in seconds, which must not decrease.
     pub fn contact_at(&mut self, time_s: f64) -> Option<Contact> {
-        if let Some(held) = self.held {
+        if let Some(held) = self.set_by_stage {
             return held;
         }
         if let Some(script) = &self.script {
@@ -127,7 +127,7 @@ impl Finger {
     }
 
     /// Returns whether a line is a command to a finger.
-    pub fn knows(line: &str) -> bool {
+    pub fn is_command(line: &str) -> bool {
         matches!(line.split_whitespace().next(), Some("finger" | "lift" | "reset"))
     }
 
@@ -135,17 +135,17 @@ impl Finger {
     ///
     /// # Errors
     /// The problem.
-    pub fn obey(&mut self, line: &str) -> Result<(), &'static str> {
+    pub fn execute(&mut self, line: &str) -> Result<(), &'static str> {
         let words: Vec<&str> = line.split_whitespace().collect();
         match words.as_slice() {
-            ["lift"] => self.held = Some(None),
-            ["reset"] => self.held = None,
+            ["lift"] => self.set_by_stage = Some(None),
+            ["reset"] => self.set_by_stage = None,
             ["finger", numbers @ ..] => {
                 let numbers: Option<Vec<f64>> = numbers.iter().map(|word| word.parse().ok()).collect();
                 let Some(&[x_mm, y_mm, force_n]) = numbers.as_deref() else {
                     return Err("`finger` needs three numbers: x and y in mm, force in N");
                 };
-                self.held = Some(self.contact(x_mm, y_mm, force_n)?);
+                self.set_by_stage = Some(self.contact(x_mm, y_mm, force_n)?);
             }
             _ => return Err("commands are `finger x y force`, `lift` and `reset`"),
         }
@@ -158,8 +158,8 @@ impl Finger {
     }
 
     /// Sets the contact by a stage.
-    pub fn hold(&mut self, contact: Option<Contact>) {
-        self.held = Some(contact);
+    pub fn set_contact(&mut self, contact: Option<Contact>) {
+        self.set_by_stage = Some(contact);
     }
 
     fn contact(&self, x_mm: f64, y_mm: f64, force_n: f64) -> Result<Option<Contact>, &'static str> {
@@ -176,23 +176,23 @@ impl Finger {
     }
 
     fn next_touch(&mut self, after_s: f64) -> Touch {
-        let start_s = after_s + self.between(Self::LIFTED_S);
-        let end_s = start_s + self.between(Self::TOUCH_S);
+        let start_s = after_s + self.random_between(Self::LIFTED_S);
+        let end_s = start_s + self.random_between(Self::TOUCH_S);
         let force_n = match self.force_n {
             Some(force_n) => force_n,
-            None => self.typical_n * self.between((0.5, 1.5)),
+            None => self.typical_n * self.random_between((0.5, 1.5)),
         };
         Touch { from: self.place(), to: self.place(), force_n, start_s, end_s }
     }
 
     fn place(&mut self) -> Position {
         let share = (Self::MARGIN, 1.0 - Self::MARGIN);
-        let x_m = self.extent.length_m() * self.between(share);
-        let y_m = self.extent.width_m().map_or(0.0, |width_m| width_m * self.between(share));
+        let x_m = self.extent.length_m() * self.random_between(share);
+        let y_m = self.extent.width_m().map_or(0.0, |width_m| width_m * self.random_between(share));
         Position { x_m, y_m }
     }
 
-    fn between(&mut self, (low, high): (f64, f64)) -> f64 {
+    fn random_between(&mut self, (low, high): (f64, f64)) -> f64 {
         self.rng.random_range(low..high)
     }
 }
@@ -249,21 +249,21 @@ mod tests {
     #[test]
     fn a_stage_moves_it() {
         let mut finger = finger();
-        finger.obey("finger 120 0 2.5").unwrap();
+        finger.execute("finger 120 0 2.5").unwrap();
         let contact = finger.contact_at(0.0).unwrap();
         assert!((contact.position.x_m - 0.12).abs() < 1e-12 && contact.force_n == 2.5);
-        finger.obey("lift").unwrap();
+        finger.execute("lift").unwrap();
         assert_eq!(finger.contact_at(0.0), None);
         assert!(
-            Finger::knows(" finger a")
-                && Finger::knows("lift")
-                && !Finger::knows("brake")
-                && !Finger::knows("")
+            Finger::is_command(" finger a")
+                && Finger::is_command("lift")
+                && !Finger::is_command("brake")
+                && !Finger::is_command("")
         );
         for wrong in ["finger 1 2", "finger 999 0 1", "finger 1 0 -1", "finger a b c", "dance", ""] {
-            assert!(finger.obey(wrong).is_err(), "{wrong}");
+            assert!(finger.execute(wrong).is_err(), "{wrong}");
         }
-        finger.obey("reset").unwrap();
+        finger.execute("reset").unwrap();
         assert!((0..100).any(|tenth| finger.contact_at(f64::from(tenth) * 0.1).is_some()));
     }
 }

@@ -60,7 +60,7 @@ const EARLY_LIFT_S: f64 = 0.15;
 
 /// A hand in the course of a calibration.
 #[derive(Clone, Debug)]
-pub struct Hand {
+pub struct SimulatedHand {
     style: HandStyle,
     extent: Extent,
     rng: Xoshiro256PlusPlus,
@@ -78,7 +78,7 @@ struct Leg {
     share: f64,
 }
 
-impl Hand {
+impl SimulatedHand {
     /// Returns a lifted hand.
     pub fn new(style: HandStyle, extent: Extent, seed: u64) -> Self {
         Self {
@@ -101,7 +101,7 @@ impl Hand {
                 Instruction::Press(contact) if !self.presses => {
                     self.presses = true;
                     self.begun_s = time_s;
-                    self.position = self.beside(contact.position);
+                    self.position = self.place_with_error(contact.position);
                     self.force_n = contact.force_n;
                     self.motion = self.pressing();
                 }
@@ -171,7 +171,7 @@ impl Hand {
         from
     }
 
-    fn beside(&mut self, position: Position) -> Position {
+    fn place_with_error(&mut self, position: Position) -> Position {
         let mut off = |at_m: f64, side_m: f64| {
             let drawn: f64 = StandardNormal.sample(&mut self.rng);
             (at_m + self.style.placement_m * drawn).clamp(0.0, side_m)

@@ -7,11 +7,11 @@ mod link;
 
 pub use faults::FaultConfig;
 pub use finger::{Finger, ScriptError};
-pub use hand::{Hand, HandStyle, Instruction};
+pub use hand::{HandStyle, Instruction, SimulatedHand};
 pub use link::{Link, LinkError, LinkUrl, LinkUrlError};
 
 use crate::frame::{self, Channel};
-use faults::{Fate, Faults};
+use faults::{Delivery, Faults};
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::{SimulateError, SimulatedBench};
 use palpate_mechanics::contact::{Contact, Extent};
@@ -75,12 +75,12 @@ pub struct SimulatedBoard<'a> {
     /// Frames can repeat it.
     measured: (Vec<f64>, f64),
     count: u64,
-    sent: Sent,
+    counts: FrameCounts,
 }
 
 /// Counts of frames.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Sent {
+pub struct FrameCounts {
     /// Whole frames.
     pub whole: u64,
     /// Dropped frames.
@@ -115,7 +115,7 @@ impl<'a> SimulatedBoard<'a> {
                 .map(|cell| (cell, Xoshiro256PlusPlus::seed_from_u64(config.seed ^ 0x10AD))),
             measured: (Vec::new(), 0.0),
             count: 0,
-            sent: Sent::default(),
+            counts: FrameCounts::default(),
         })
     }
 
@@ -139,8 +139,8 @@ impl<'a> SimulatedBoard<'a> {
     }
 
     /// Counts of frames.
-    pub fn sent(&self) -> &Sent {
-        &self.sent
+    pub fn sent(&self) -> &FrameCounts {
+        &self.counts
     }
 
     /// Finger.
@@ -169,13 +169,13 @@ impl<'a> SimulatedBoard<'a> {
         let mut frame = self.frame(time_s);
         self.count += 1;
         match self.faults.next(frame.len()) {
-            Fate::Whole => self.sent.whole += 1,
-            Fate::Torn { lost } => {
-                self.sent.torn += 1;
+            Delivery::Whole => self.counts.whole += 1,
+            Delivery::Torn { lost } => {
+                self.counts.torn += 1;
                 frame.drain(lost);
             }
-            Fate::Dropped => {
-                self.sent.dropped += 1;
+            Delivery::Dropped => {
+                self.counts.dropped += 1;
                 return None;
             }
         }

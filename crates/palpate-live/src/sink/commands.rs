@@ -19,11 +19,11 @@ pub struct CommandSink {
     to: Commander,
     reports: SyncSender<Input>,
     stretch: (Instant, u32),
-    trouble: Option<Unsent>,
+    trouble: Option<CommandSinkError>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-enum Unsent {
+enum CommandSinkError {
     #[error(transparent)]
     Device(SendError),
     #[error("rules have sent {MOST} commands within {} s, the maximum; increase `hold` so that they act less often", STRETCH.as_secs())]
@@ -54,16 +54,16 @@ impl CommandSink {
         }
     }
 
-    fn send(&mut self, line: &str) -> Result<(), Unsent> {
+    fn send(&mut self, line: &str) -> Result<(), CommandSinkError> {
         let (start, count) = &mut self.stretch;
         if start.elapsed() >= STRETCH {
             (*start, *count) = (Instant::now(), 0);
         }
         if *count >= MOST {
-            return Err(Unsent::TooMany);
+            return Err(CommandSinkError::TooMany);
         }
         *count += 1;
-        self.to.send_line(line).map_err(Unsent::Device)
+        self.to.send_line(line).map_err(CommandSinkError::Device)
     }
 }
 

@@ -189,7 +189,7 @@ impl Publisher {
                 }
             }
         }
-        self.say_goodbye();
+        self.publish_offline();
     }
 
     fn publish(&self, topic: &str, record: &impl Serialize) {
@@ -212,7 +212,7 @@ impl Publisher {
         }
     }
 
-    fn say_goodbye(&self) {
+    fn publish_offline(&self) {
         if !self.online.load(Ordering::Relaxed) {
             // The broker has published the last will of this client; the driver ends with the process.
             self.done.store(true, Ordering::Relaxed);
@@ -285,7 +285,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn urls_say_broker_login_and_topic() {
+    fn urls_give_broker_login_and_topic() {
         let url: MqttUrl = "mqtt://me:secret@bench.local:1884/left/contact".parse().unwrap();
         assert_eq!((url.broker.host.as_str(), url.broker.port), ("bench.local", 1884));
         assert_eq!(url.topic, "left/contact");

@@ -1,6 +1,6 @@
 //! `file:recording.mcap?speed=1`: a recording.
 
-use super::{Outlet, SourceError};
+use super::{InputSender, SourceError};
 use crate::input::Arrival;
 use crate::recording::{Playback, Recorded};
 use std::fmt::Write;
@@ -11,7 +11,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 const BURST: usize = 1 << 12;
 
 /// Opens a recording for a replay at `speed`; 0 is the fastest.
-pub fn open(outlet: Outlet, path: &Path, speed: f64) -> Result<(), SourceError> {
+pub fn open(outlet: InputSender, path: &Path, speed: f64) -> Result<(), SourceError> {
     let playback = Playback::open(path)?;
     let name = format!("the recording {}", path.display());
     std::thread::Builder::new().name("source".to_owned()).spawn(move || {
@@ -22,7 +22,7 @@ pub fn open(outlet: Outlet, path: &Path, speed: f64) -> Result<(), SourceError> 
     Ok(())
 }
 
-fn run(outlet: &Outlet, mut playback: Playback, speed: f64) -> bool {
+fn run(outlet: &InputSender, mut playback: Playback, speed: f64) -> bool {
     let start = Instant::now();
     let mut first_ns = None;
     let mut bytes = Vec::new();
@@ -32,7 +32,7 @@ fn run(outlet: &Outlet, mut playback: Playback, speed: f64) -> bool {
             Err(error) => return outlet.send(Arrival::Lost(error.to_string())),
         };
         let Some(recorded) = recorded else {
-            let loss = playback.passed_over().loss();
+            let loss = playback.skipped().loss();
             return (bytes.is_empty() || outlet.send(Arrival::Bytes(bytes)))
                 && loss.is_none_or(|loss| outlet.send(Arrival::Lost(loss)));
         };
@@ -55,7 +55,7 @@ fn run(outlet: &Outlet, mut playback: Playback, speed: f64) -> bool {
     }
 }
 
-fn sleep_until(outlet: &Outlet, start: Instant, due: Duration) -> bool {
+fn sleep_until(outlet: &InputSender, start: Instant, due: Duration) -> bool {
     loop {
         let left = due.saturating_sub(start.elapsed());
         if outlet.is_stopped() {

@@ -15,7 +15,7 @@ pub use crate::commander::{Commander, SendError};
 pub use file::line;
 pub use url::{SourceUrl, SourceUrlError};
 
-use crate::input::{Arrival, Arrived, Input};
+use crate::input::{Arrival, Input, TimedArrival};
 use crate::simulated_board::BoardConfig;
 use crate::stamp::HostClock;
 use palpate_rig::Rig;
@@ -70,14 +70,14 @@ impl Drop for Source {
     }
 }
 
-pub(crate) struct Outlet {
+pub(crate) struct InputSender {
     to: SyncSender<Input>,
     clock: HostClock,
     stop: Arc<AtomicBool>,
     open: Arc<AtomicBool>,
 }
 
-impl Outlet {
+impl InputSender {
     fn new(to: SyncSender<Input>, clock: HostClock) -> Self {
         Self { to, clock, stop: Arc::default(), open: Arc::default() }
     }
@@ -96,7 +96,7 @@ impl Outlet {
             Arrival::Lost(_) | Arrival::Ended => self.open.store(false, Ordering::Relaxed),
             Arrival::Backlog(_) | Arrival::Bytes(_) | Arrival::Message(_) => {}
         }
-        let mut input = Input::Arrived(Arrived { at: self.clock.now(), arrival });
+        let mut input = Input::Arrived(TimedArrival { at: self.clock.now(), arrival });
         while !self.is_stopped() {
             match self.to.try_send(input) {
                 Ok(()) => return true,
@@ -131,7 +131,7 @@ impl Source {
         clock: HostClock,
         to: SyncSender<Input>,
     ) -> Result<Self, SourceError> {
-        let outlet = Outlet::new(to, clock);
+        let outlet = InputSender::new(to, clock);
         let mut source = outlet.source();
         let (commander, for_device) = Commander::new(Arc::clone(&source.open));
         // Line end of commands, for a source that accepts them.
@@ -187,7 +187,7 @@ impl Source {
         clock: HostClock,
         to: SyncSender<Input>,
     ) -> Result<Self, SourceError> {
-        let outlet = Outlet::new(to, clock);
+        let outlet = InputSender::new(to, clock);
         let source = outlet.source();
         simulated::open_rig(outlet, rig, config, "a simulated board".to_owned())?;
         Ok(source)

@@ -1,6 +1,6 @@
 //! `mqtt://host/topic`: messages of an MQTT broker.
 
-use super::{Address, BackOff, CONNECT, LOOK, Outlet, forget};
+use super::{Address, BackOff, CONNECT, InputSender, LOOK, forget};
 use crate::broker::explain;
 use crate::frame::LONGEST_MESSAGE;
 use crate::input::Arrival;
@@ -21,7 +21,7 @@ type Credentials = (String, String);
 const KEEP_ALIVE: Duration = Duration::from_secs(5);
 
 pub fn run(
-    outlet: &Outlet,
+    outlet: &InputSender,
     commands: &Receiver<Vec<u8>>,
     broker: &Address,
     login: Option<Credentials>,
@@ -29,7 +29,7 @@ pub fn run(
 ) {
     match tokio::runtime::Builder::new_current_thread().enable_all().build() {
         Ok(runtime) => {
-            runtime.block_on(bring(outlet, commands, broker, login, topic));
+            runtime.block_on(read_broker(outlet, commands, broker, login, topic));
             // This does not wait for a pending name lookup.
             runtime.shutdown_background();
         }
@@ -39,8 +39,8 @@ pub fn run(
     }
 }
 
-async fn bring(
-    outlet: &Outlet,
+async fn read_broker(
+    outlet: &InputSender,
     commands: &Receiver<Vec<u8>>,
     broker: &Address,
     login: Option<Credentials>,
@@ -117,7 +117,7 @@ fn connection(broker: &Address, login: Option<Credentials>) -> (AsyncClient, Eve
 
 /// Waits for a packet, and calls `look` repeatedly.
 async fn next(
-    outlet: &Outlet,
+    outlet: &InputSender,
     events: &mut EventLoop,
     look: impl Fn(),
 ) -> Option<Result<Event, ConnectionError>> {

@@ -1,6 +1,6 @@
 //! Ports with reconnection: serial, TCP and UDP.
 
-use super::{BackOff, LOOK, Outlet, forget};
+use super::{BackOff, InputSender, LOOK, forget};
 use crate::input::Arrival;
 use std::io::{self, ErrorKind, Read, Write};
 use std::sync::mpsc::Receiver;
@@ -25,7 +25,7 @@ pub trait Port {
 
 /// Sends `opened` and the data of a device, which is opened again after each loss.
 pub fn run<P: Port>(
-    outlet: &Outlet,
+    outlet: &InputSender,
     commands: &Receiver<Vec<u8>>,
     opened: &Arrival,
     mut open: impl FnMut() -> io::Result<P>,
@@ -43,7 +43,7 @@ pub fn run<P: Port>(
                 {
                     return;
                 }
-                match bring(outlet, commands, &mut port, &mut back_off) {
+                match read_port(outlet, commands, &mut port, &mut back_off) {
                     Ok(()) => return,
                     Err(error) => error,
                 }
@@ -60,8 +60,8 @@ pub fn run<P: Port>(
     }
 }
 
-fn bring(
-    outlet: &Outlet,
+fn read_port(
+    outlet: &InputSender,
     commands: &Receiver<Vec<u8>>,
     port: &mut impl Port,
     back_off: &mut BackOff,

@@ -1,14 +1,14 @@
 //! `serial:///dev/ttyACM0?baud=115200`: a serial port.
 
 use super::port::{self, Port, Stream};
-use super::{LOOK, Outlet};
+use super::{InputSender, LOOK};
 use crate::input::Arrival;
 use serialport::SerialPort;
 use std::io::{self, Read};
 use std::path::Path;
 use std::sync::mpsc::Receiver;
 
-pub fn run(outlet: &Outlet, commands: &Receiver<Vec<u8>>, path: &Path, baud: u32) {
+pub fn run(outlet: &InputSender, commands: &Receiver<Vec<u8>>, path: &Path, baud: u32) {
     // A board sends as long as it has power, so the first line can be incomplete.
     let opened = Arrival::Joined(format!("{} at {baud} baud", path.display()));
     port::run(outlet, commands, &opened, || {

@@ -1,17 +1,17 @@
 //! `-`: standard input.
 
-use super::Outlet;
+use super::InputSender;
 use crate::input::Arrival;
 use std::io::Read;
 
 const CHUNK: usize = 1 << 16;
 
-pub fn open(outlet: Outlet) -> std::io::Result<()> {
+pub fn open(outlet: InputSender) -> std::io::Result<()> {
     std::thread::Builder::new().name("source".to_owned()).spawn(move || run(&outlet))?;
     Ok(())
 }
 
-fn run(outlet: &Outlet) {
+fn run(outlet: &InputSender) {
     let mut stdin = std::io::stdin().lock();
     let mut buffer = vec![0; CHUNK];
     if !outlet.send(Arrival::Piped("stdin".to_owned())) {

@@ -1,7 +1,7 @@
 //! `tcp://host:port`: a server of frames.
 
 use super::port::{self, Stream};
-use super::{Address, CONNECT, LOOK, Outlet};
+use super::{Address, CONNECT, InputSender, LOOK};
 use crate::input::Arrival;
 use socket2::{SockRef, TcpKeepalive};
 use std::io;
@@ -13,7 +13,7 @@ use std::time::Duration;
 /// Silence, interval and number of probes: a board without power does not close the connection.
 const ALIVE: (Duration, Duration, u32) = (Duration::from_secs(2), Duration::from_secs(1), 3);
 
-pub fn run(outlet: &Outlet, commands: &Receiver<Vec<u8>>, server: &Address) {
+pub fn run(outlet: &InputSender, commands: &Receiver<Vec<u8>>, server: &Address) {
     // A bridge to a serial port can begin amid a line, so the first line can be incomplete.
     let opened = Arrival::Joined(format!("tcp://{server}"));
     port::run(outlet, commands, &opened, || {
@@ -29,7 +29,7 @@ pub fn run(outlet: &Outlet, commands: &Receiver<Vec<u8>>, server: &Address) {
 }
 
 /// The thread is abandoned at the end of the source.
-fn connect(outlet: &Outlet, server: &Address) -> io::Result<TcpStream> {
+fn connect(outlet: &InputSender, server: &Address) -> io::Result<TcpStream> {
     let (to, from) = sync_channel(1);
     let address = server.clone();
     thread::Builder::new().name("connect".to_owned()).spawn(move || {

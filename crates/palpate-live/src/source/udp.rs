@@ -1,13 +1,13 @@
 //! `udp://:port`: datagrams, one message each.
 
 use super::port::{self, Port};
-use super::{Address, LOOK, Outlet};
+use super::{Address, InputSender, LOOK};
 use crate::input::Arrival;
 use std::io;
 use std::net::UdpSocket;
 use std::sync::mpsc::Receiver;
 
-pub fn run(outlet: &Outlet, commands: &Receiver<Vec<u8>>, at: &Address) {
+pub fn run(outlet: &InputSender, commands: &Receiver<Vec<u8>>, at: &Address) {
     let host = if at.host.is_empty() { "0.0.0.0" } else { &at.host };
     let opened = Arrival::Opened(format!("udp://{at}"));
     port::run(outlet, commands, &opened, || {

@@ -13,17 +13,17 @@ pub enum StageError {
     /// Unknown firmware.
     #[error(
         "the machine identifies itself neither as Marlin nor as GRBL; its answer is {}; check the baud rate",
-        quoted(said)
+        quoted(answer)
     )]
     Unknown {
         /// Text of the answer.
-        said: String,
+        answer: String,
     },
     /// Unexpected answer or position.
-    #[error("{doubt}; {finger}")]
-    Doubt {
+    #[error("{reason}; {finger}")]
+    Unexpected {
         /// Reason.
-        doubt: Doubt,
+        reason: StopReason,
         /// Finger after the stop.
         finger: Finger,
     },
@@ -43,7 +43,7 @@ pub enum StageError {
 
 /// Reason for a stop: unexpected answer or position.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Doubt {
+pub enum StopReason {
     /// Unexpected answer.
     #[error("the machine answered {} to `{command}`", quoted(answer))]
     Answer {
@@ -92,7 +92,7 @@ pub enum Doubt {
     },
 }
 
-/// Finger after a stop for a `Doubt`.
+/// Finger after a stop for a [`StopReason`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Finger {
     /// No move so far.

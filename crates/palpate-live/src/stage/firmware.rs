@@ -11,7 +11,7 @@ pub enum Firmware {
 
 /// Meaning of a line before the `ok`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Answer {
+pub(super) enum ReplyKind {
     Ok,
     Report,
     /// Restart without a position.
@@ -59,12 +59,12 @@ impl Firmware {
         }
     }
 
-    pub(super) fn classify(self, line: &str) -> Answer {
+    pub(super) fn classify(self, line: &str) -> ReplyKind {
         if is_ok(line) {
-            return Answer::Ok;
+            return ReplyKind::Ok;
         }
         if is_greeting(line) {
-            return Answer::Greeting;
+            return ReplyKind::Greeting;
         }
         let is_report = match self {
             Self::Marlin => {
@@ -75,11 +75,11 @@ impl Firmware {
             }
             Self::Grbl => status(line).is_some_and(|status| matches!(status.state, "Idle" | "Run" | "Home")),
         };
-        if is_report { Answer::Report } else { Answer::Unexpected }
+        if is_report { ReplyKind::Report } else { ReplyKind::Unexpected }
     }
 
     /// True if `answer` quotes `command` as unknown: it arrived whole.
-    pub(super) fn does_not_know(self, command: &str, answer: &str) -> bool {
+    pub(super) fn is_unknown_command(self, command: &str, answer: &str) -> bool {
         self == Self::Marlin && answer == format!("echo:Unknown command: \"{command}\"")
     }
 }
@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn classifies_lines_before_an_ok() {
-        use Answer::{Greeting, Ok, Report, Unexpected};
+        use ReplyKind::{Greeting, Ok, Report, Unexpected};
         for (firmware, line, answer) in [
             (Firmware::Marlin, "ok", Ok),
             (Firmware::Marlin, "ok P15 B3", Ok),

@@ -4,8 +4,8 @@
 //! (Marlin), or a dwell `G4` (GRBL). Marlin answers `ok` even to unexecuted lines. Every `ok` therefore
 //! requires expected lines only, and a position at the target.
 
-use super::error::{Doubt, StageError};
-use super::firmware::{Answer, Firmware, position_mm, status};
+use super::error::{StageError, StopReason};
+use super::firmware::{Firmware, ReplyKind, position_mm, status};
 use super::link::StageLink;
 use palpate_mechanics::contact::Position;
 use palpate_rig::Stage;
@@ -74,7 +74,7 @@ pub(super) enum Fault {
     Line(io::Error),
     Stopped,
     NotHomed,
-    Doubt(Doubt),
+    Unexpected(StopReason),
 }
 
 impl From<io::Error> for Fault {
@@ -127,12 +127,12 @@ impl<L: StageLink> GcodeStage<L> {
         };
         let mut said = String::new();
         let identified = stage.identify(&mut said);
-        match stage.end_of(identified)? {
+        match stage.stop_on_fault(identified)? {
             Some(firmware) => stage.firmware = firmware,
-            None => return Err(StageError::Unknown { said }),
+            None => return Err(StageError::Unknown { answer: said }),
         }
         let agreed = stage.synchronize(ANSWER).and_then(|()| stage.learn_stopping());
-        stage.end_of(agreed)?;
+        stage.stop_on_fault(agreed)?;
         Ok(stage)
     }
 
@@ -152,7 +152,7 @@ impl<L: StageLink> GcodeStage<L> {
     /// [`StageError`].
     pub fn home(&mut self) -> Result<(), StageError> {
         let homed = self.try_to_home();
-        self.end_of(homed)?;
+        self.stop_on_fault(homed)?;
         self.lift()
     }
 
@@ -166,8 +166,8 @@ impl<L: StageLink> GcodeStage<L> {
         }
         let (x_m, y_m) = self.setup.origin_m;
         let to = [Some((x_m + position.x_m) * 1e3), Some((y_m + position.y_m) * 1e3), None];
-        let gone = self.go(to, self.setup.travel_m_per_s);
-        self.end_of(gone)
+        let gone = self.move_to(to, self.setup.travel_m_per_s);
+        self.stop_on_fault(gone)
     }
 
     /// Presses to a depth in metres.
@@ -176,8 +176,8 @@ impl<L: StageLink> GcodeStage<L> {
     /// [`StageError`].
     pub fn press(&mut self, depth_m: f64) -> Result<(), StageError> {
         let z_mm = (self.setup.touch_z_m - depth_m) * 1e3;
-        let gone = self.go([None, None, Some(z_mm)], self.setup.press_m_per_s);
-        self.end_of(gone)
+        let gone = self.move_to([None, None, Some(z_mm)], self.setup.press_m_per_s);
+        self.stop_on_fault(gone)
     }
 
     /// Moves in metres, not below the height of travel.
@@ -188,13 +188,13 @@ impl<L: StageLink> GcodeStage<L> {
         if self.is_below_travel() {
             self.lift()?;
         }
-        self.heed_stop()?;
+        self.halt_if_requested()?;
         let at_mm = self.at_mm.ok_or(StageError::NotHomed)?;
         let lowest_mm = [f64::NEG_INFINITY, f64::NEG_INFINITY, self.travel_z_mm()];
         let to_mm: [f64; 3] =
             std::array::from_fn(|axis| (at_mm[axis] + by_m[axis] * 1e3).max(lowest_mm[axis]));
-        let gone = self.go(to_mm.map(Some), self.setup.travel_m_per_s);
-        self.end_of(gone)
+        let gone = self.move_to(to_mm.map(Some), self.setup.travel_m_per_s);
+        self.stop_on_fault(gone)
     }
 
     /// Lowers the finger to a machine z in metres, not below the deepest press.
@@ -203,8 +203,8 @@ impl<L: StageLink> GcodeStage<L> {
     /// [`StageError`].
     pub fn lower(&mut self, z_m: f64) -> Result<(), StageError> {
         let z_mm = z_m.max(self.setup.lowest_z_m()) * 1e3;
-        let gone = self.go([None, None, Some(z_mm)], self.setup.press_m_per_s);
-        self.end_of(gone)
+        let gone = self.move_to([None, None, Some(z_mm)], self.setup.press_m_per_s);
+        self.stop_on_fault(gone)
     }
 
     /// Position in machine coordinates; `None` before homing and after a stop.
@@ -217,8 +217,8 @@ impl<L: StageLink> GcodeStage<L> {
     /// # Errors
     /// [`StageError`].
     pub fn lift(&mut self) -> Result<(), StageError> {
-        let gone = self.go([None, None, Some(self.travel_z_mm())], self.setup.travel_m_per_s);
-        self.end_of(gone)
+        let gone = self.move_to([None, None, Some(self.travel_z_mm())], self.setup.travel_m_per_s);
+        self.stop_on_fault(gone)
     }
 
     /// Reads lines outside of any command, such as a greeting after a reset.
@@ -226,28 +226,28 @@ impl<L: StageLink> GcodeStage<L> {
     /// # Errors
     /// [`StageError`] after a stop, and for any line except a report.
     pub fn watch(&mut self) -> Result<(), StageError> {
-        let watched = self.reject_unasked();
-        self.end_of(watched)
+        let watched = self.reject_unexpected_lines();
+        self.stop_on_fault(watched)
     }
 
     /// Halts after a requested stop.
     ///
     /// # Errors
     /// [`StageError::Stopped`] or `Line`.
-    pub fn heed_stop(&mut self) -> Result<(), StageError> {
+    pub fn halt_if_requested(&mut self) -> Result<(), StageError> {
         let heeded = self.check_stop();
-        self.end_of(heeded)
+        self.stop_on_fault(heeded)
     }
 
-    /// After a `Doubt`, stops the machine, and lifts its finger if that is safe.
-    fn end_of<T>(&mut self, outcome: Result<T, Fault>) -> Result<T, StageError> {
+    /// After a `Fault::Unexpected`, stops the machine, and lifts its finger if that is safe.
+    fn stop_on_fault<T>(&mut self, outcome: Result<T, Fault>) -> Result<T, StageError> {
         outcome.map_err(|fault| match fault {
             Fault::Line(error) => StageError::Line(error),
             Fault::Stopped => StageError::Stopped,
             Fault::NotHomed => StageError::NotHomed,
-            Fault::Doubt(doubt) => {
-                let finger = self.retreat(&doubt);
-                StageError::Doubt { doubt, finger }
+            Fault::Unexpected(reason) => {
+                let finger = self.retreat(&reason);
+                StageError::Unexpected { reason, finger }
             }
         })
     }
@@ -276,14 +276,14 @@ impl<L: StageLink> GcodeStage<L> {
         for setting in self.firmware.settings() {
             // Marlin without inches rejects the command that disables them.
             self.ask(setting, ANSWER, |firmware, line| {
-                *setting == "G21" && firmware.does_not_know(setting, line)
+                *setting == "G21" && firmware.is_unknown_command(setting, line)
             })?;
         }
         Ok(())
     }
 
     /// Moves straight to `to_mm`, in mm and mm/min, and checks the final position.
-    pub(super) fn go(&mut self, to_mm: [Option<f64>; 3], speed_m_per_s: f64) -> Result<(), Fault> {
+    pub(super) fn move_to(&mut self, to_mm: [Option<f64>; 3], speed_m_per_s: f64) -> Result<(), Fault> {
         self.check_stop()?;
         let from_mm = self.at_mm.ok_or(Fault::NotHomed)?;
         self.target_mm = std::array::from_fn(|axis| to_mm[axis].unwrap_or(from_mm[axis]));
@@ -311,7 +311,7 @@ impl<L: StageLink> GcodeStage<L> {
         let at_mm = self.position()?;
         for (axis, name) in ['X', 'Y', 'Z'].into_iter().enumerate() {
             if (at_mm[axis] - target_mm[axis]).abs() > TOLERANCE_MM {
-                return Err(Fault::Doubt(Doubt::OffPosition {
+                return Err(Fault::Unexpected(StopReason::OffPosition {
                     axis: name,
                     target_mm: target_mm[axis],
                     reported_mm: at_mm[axis],
@@ -329,30 +329,36 @@ impl<L: StageLink> GcodeStage<L> {
                 at_mm = position_mm(line).or(at_mm);
                 false
             })?;
-            let no_report = Doubt::NoReport { command: "M114".to_owned(), expected: "a position" };
-            return at_mm.ok_or(Fault::Doubt(no_report));
+            let no_report = StopReason::NoReport { command: "M114".to_owned(), expected: "a position" };
+            return at_mm.ok_or(Fault::Unexpected(no_report));
         }
         let until = self.link.now() + ANSWER;
         loop {
             let report = self.status_report(until)?;
             if report.state == "Idle" {
                 let expected = "a position";
-                let no_report = Fault::Doubt(Doubt::NoReport { command: "?".to_owned(), expected });
+                let no_report = Fault::Unexpected(StopReason::NoReport { command: "?".to_owned(), expected });
                 return report.work_mm.ok_or(no_report);
             }
             if self.link.now() >= until {
-                return Err(Fault::Doubt(Doubt::Answer { command: "?".to_owned(), answer: report.state }));
+                return Err(Fault::Unexpected(StopReason::Answer {
+                    command: "?".to_owned(),
+                    answer: report.state,
+                }));
             }
         }
     }
 
     /// GRBL answers `?` at any time without `ok`.
     pub(super) fn status_report(&mut self, until: Duration) -> Result<StatusReport, Fault> {
-        self.reject_unasked()?;
+        self.reject_unexpected_lines()?;
         self.link.write_all(b"?")?;
         self.link.flush()?;
         let Some(line) = self.next_line(until)? else {
-            return Err(Fault::Doubt(Doubt::Silent { command: "?".to_owned(), seconds: ANSWER.as_secs() }));
+            return Err(Fault::Unexpected(StopReason::Silent {
+                command: "?".to_owned(),
+                seconds: ANSWER.as_secs(),
+            }));
         };
         let Some(status) = status(&line) else { return Err(self.unexpected("?", line)) };
         if let Some(offset_mm) = status.offset_mm {
@@ -430,7 +436,7 @@ impl<L: StageLink> GcodeStage<L> {
             }
         }
         if is_silent {
-            return Err(Fault::Doubt(Doubt::Silent { command, seconds: time.as_secs() }));
+            return Err(Fault::Unexpected(StopReason::Silent { command, seconds: time.as_secs() }));
         }
         // Without an echo, silence has lasted long enough; the report of the next query verifies its `ok`.
         Ok(())
@@ -460,7 +466,7 @@ impl<L: StageLink> GcodeStage<L> {
                 return Ok(());
             }
         }
-        Err(Fault::Doubt(Doubt::NoReport { command: "$I".to_owned(), expected: "its version" }))
+        Err(Fault::Unexpected(StopReason::NoReport { command: "$I".to_owned(), expected: "its version" }))
     }
 
     fn learn_stopping(&mut self) -> Result<(), Fault> {
@@ -476,7 +482,7 @@ impl<L: StageLink> GcodeStage<L> {
         })?;
         if !is_named {
             let expected = "a FIRMWARE_NAME of Marlin";
-            return Err(Fault::Doubt(Doubt::NoReport { command: "M115".to_owned(), expected }));
+            return Err(Fault::Unexpected(StopReason::NoReport { command: "M115".to_owned(), expected }));
         }
         self.stopping = match (is_at_once, self.setup.dtr_reset) {
             (true, _) => Stopping::AtOnce,
@@ -497,25 +503,25 @@ impl<L: StageLink> GcodeStage<L> {
         time: Duration,
         mut takes: impl FnMut(Firmware, &str) -> bool,
     ) -> Result<(), Fault> {
-        self.reject_unasked()?;
+        self.reject_unexpected_lines()?;
         self.send(command)?;
         let until = self.link.now() + time;
         while let Some(line) = self.next_line(until)? {
             let is_asked_for = takes(self.firmware, &line);
             match self.firmware.classify(&line) {
-                Answer::Ok => return Ok(()),
-                Answer::Report => {}
-                Answer::Greeting | Answer::Unexpected if is_asked_for => {}
-                Answer::Greeting | Answer::Unexpected => return Err(self.unexpected(command, line)),
+                ReplyKind::Ok => return Ok(()),
+                ReplyKind::Report => {}
+                ReplyKind::Greeting | ReplyKind::Unexpected if is_asked_for => {}
+                ReplyKind::Greeting | ReplyKind::Unexpected => return Err(self.unexpected(command, line)),
             }
         }
-        Err(Fault::Doubt(Doubt::Silent { command: command.to_owned(), seconds: time.as_secs() }))
+        Err(Fault::Unexpected(StopReason::Silent { command: command.to_owned(), seconds: time.as_secs() }))
     }
 
     fn unexpected(&self, command: &str, line: String) -> Fault {
-        Fault::Doubt(match self.firmware.classify(&line) {
-            Answer::Greeting => Doubt::Restart { greeting: line },
-            _ => Doubt::Answer { command: command.to_owned(), answer: line },
+        Fault::Unexpected(match self.firmware.classify(&line) {
+            ReplyKind::Greeting => StopReason::Restart { greeting: line },
+            _ => StopReason::Answer { command: command.to_owned(), answer: line },
         })
     }
 
@@ -526,12 +532,14 @@ impl<L: StageLink> GcodeStage<L> {
     }
 
     /// Rejects lines outside of any command; an `ok` would be mistaken for the next answer.
-    fn reject_unasked(&mut self) -> Result<(), Fault> {
+    fn reject_unexpected_lines(&mut self) -> Result<(), Fault> {
         while let Some(line) = self.next_line(self.link.now())? {
             match self.firmware.classify(&line) {
-                Answer::Report => {}
-                Answer::Greeting => return Err(Fault::Doubt(Doubt::Restart { greeting: line })),
-                Answer::Ok | Answer::Unexpected => return Err(Fault::Doubt(Doubt::Unasked { line })),
+                ReplyKind::Report => {}
+                ReplyKind::Greeting => return Err(Fault::Unexpected(StopReason::Restart { greeting: line })),
+                ReplyKind::Ok | ReplyKind::Unexpected => {
+                    return Err(Fault::Unexpected(StopReason::Unasked { line }));
+                }
             }
         }
         Ok(())
@@ -598,12 +606,12 @@ impl<L: StageLink> GcodeStage<L> {
         if self.stopping == Stopping::ByReset {
             self.link.reset_by_dtr()?;
         }
-        self.hear_out();
+        self.read_last_lines();
         Ok(())
     }
 
     /// Reads the last output; closing a connection with unread bytes could lose the stop.
-    fn hear_out(&mut self) {
+    fn read_last_lines(&mut self) {
         let until = self.link.now() + LAST_WORDS;
         while self.link.now() < until && self.read().is_ok() {
             self.received.clear();

@@ -13,12 +13,12 @@ mod simulated;
 mod thread;
 mod url;
 
-pub use error::{Doubt, Finger, StageError};
+pub use error::{Finger, StageError, StopReason};
 pub use firmware::Firmware;
 pub use gcode::{GcodeStage, Stopping};
 pub use link::StageLink;
 pub use simulated::{
     FaultKind, Greeting, MachineConfig, MachineConfigError, MachineFault, SimulatedLink, SimulatedMachine,
 };
-pub use thread::{Done, Order, StageThread};
+pub use thread::{Order, StagePosition, StageThread};
 pub use url::{StageUrl, StageUrlError};

@@ -1,9 +1,9 @@
-//! Retreat after a `Doubt`: stop, lift if safe, halt until a reset.
+//! Retreat after a `StopReason`: stop, lift if safe, halt until a reset.
 //!
 //! A lift is safe at a reported position on the last move: the machine was not reset, and the lift increases
 //! its z.
 
-use super::error::{Doubt, Finger};
+use super::error::{Finger, StopReason};
 use super::firmware::Firmware;
 use super::gcode::{Fault, GcodeStage, TOLERANCE_MM};
 use super::link::StageLink;
@@ -14,12 +14,12 @@ const LIFE: Duration = Duration::from_secs(2);
 const HOLD: Duration = Duration::from_secs(2);
 
 impl<L: StageLink> GcodeStage<L> {
-    pub(super) fn retreat(&mut self, doubt: &Doubt) -> Finger {
+    pub(super) fn retreat(&mut self, doubt: &StopReason) -> Finger {
         if !self.has_moved {
             return Finger::Unmoved;
         }
         let was_up = self.at_mm.is_some_and(|at_mm| self.is_up(at_mm[2]) && self.is_up(self.target_mm[2]));
-        let is_lost = self.at_mm.is_none() || matches!(doubt, Doubt::Restart { .. });
+        let is_lost = self.at_mm.is_none() || matches!(doubt, StopReason::Restart { .. });
         let lifted = if is_lost { Finger::Unknown } else { self.try_to_lift().unwrap_or(Finger::Unknown) };
         let finger = if was_up { Finger::Up } else { lifted };
         // Without a halt, the finger stays.
@@ -40,7 +40,7 @@ impl<L: StageLink> GcodeStage<L> {
                 self.send("M410")?;
                 self.synchronize(LIFE)?;
             }
-            Firmware::Grbl => self.hold()?,
+            Firmware::Grbl => self.feed_hold()?,
         }
         let at_mm = self.position()?;
         if !self.is_on_way(at_mm) {
@@ -50,20 +50,22 @@ impl<L: StageLink> GcodeStage<L> {
             return Ok(Finger::Up);
         }
         self.at_mm = Some(at_mm);
-        self.go([None, None, Some(self.travel_z_mm())], self.setup.travel_m_per_s)?;
+        self.move_to([None, None, Some(self.travel_z_mm())], self.setup.travel_m_per_s)?;
         Ok(Finger::Lifted)
     }
 
     /// Stops by a feed hold; a reset at rest then drops the moves, but not the position.
-    fn hold(&mut self) -> Result<(), Fault> {
-        self.pass_over(LIFE)?;
+    fn feed_hold(&mut self) -> Result<(), Fault> {
+        self.skip_until_silence(LIFE)?;
         let until = self.link.now() + LIFE;
         let state = self.status_report(until)?.state;
         match state.as_str() {
             "Idle" => return self.synchronize(LIFE),
             "Run" | "Hold" => {}
             // An alarm may lose the position.
-            _ => return Err(Fault::Doubt(Doubt::Answer { command: "?".to_owned(), answer: state })),
+            _ => {
+                return Err(Fault::Unexpected(StopReason::Answer { command: "?".to_owned(), answer: state }));
+            }
         }
         self.link.write_all(b"!")?;
         let until = self.link.now() + HOLD;
@@ -73,17 +75,20 @@ impl<L: StageLink> GcodeStage<L> {
                 break;
             }
             if self.link.now() >= until {
-                return Err(Fault::Doubt(Doubt::Silent { command: "!".to_owned(), seconds: HOLD.as_secs() }));
+                return Err(Fault::Unexpected(StopReason::Silent {
+                    command: "!".to_owned(),
+                    seconds: HOLD.as_secs(),
+                }));
             }
         }
         self.link.write_all(b"\x18")?;
-        self.pass_over(HOLD)?;
+        self.skip_until_silence(HOLD)?;
         self.synchronize(LIFE)?;
         self.set()
     }
 
     /// Reads until silence, at most for `most`.
-    fn pass_over(&mut self, most: Duration) -> Result<(), Fault> {
+    fn skip_until_silence(&mut self, most: Duration) -> Result<(), Fault> {
         let until = self.link.now() + most;
         while self.next_line(self.link.now())?.is_some() && self.link.now() < until {}
         Ok(())

@@ -201,9 +201,9 @@ impl SimulatedMachine {
             is_homed: false,
             mode: Mode::Ready,
             stopped_at: None,
-            seen,
+            line_counts: seen,
             faults_met: 0,
-            doubtful_moves: 0,
+            unsafe_moves: 0,
         };
         state.open();
         Self { state: Arc::new(Mutex::new(state)) }
@@ -270,8 +270,8 @@ impl SimulatedMachine {
     }
 
     /// Number of moves after a fault or before homing, without lifts.
-    pub fn doubtful_moves(&self) -> usize {
-        self.state().doubtful_moves
+    pub fn unsafe_moves(&self) -> usize {
+        self.state().unsafe_moves
     }
 
     /// Creates a link in virtual time.
@@ -294,7 +294,7 @@ impl Read for SimulatedLink {
             let now = state.now + self.is_waited_for;
             state.advance_to(now);
         }
-        let answers = state.take_some(buffer.len());
+        let answers = state.take_bytes(buffer.len());
         if answers.is_empty() {
             return Err(io::ErrorKind::TimedOut.into());
         }
@@ -371,9 +371,9 @@ struct State {
     mode: Mode,
     stopped_at: Option<Duration>,
     /// Number of lines of each fault.
-    seen: Vec<u32>,
+    line_counts: Vec<u32>,
     faults_met: usize,
-    doubtful_moves: usize,
+    unsafe_moves: usize,
 }
 
 /// Interval of `busy` messages.
@@ -410,7 +410,7 @@ impl State {
             Firmware::Marlin => "start\necho:Marlin 2.1.2\n",
             Firmware::Grbl => "\r\nGrbl 1.1h ['$' for help]\r\n",
         };
-        self.answer_at(self.deaf_until, greeting);
+        self.queue_reply_at(self.deaf_until, greeting);
         if self.firmware == Firmware::Grbl {
             self.mode = Mode::Alarm;
         }
@@ -431,11 +431,11 @@ impl State {
         std::array::from_fn(|axis| at_m[axis] + self.shift_m[axis])
     }
 
-    fn answer(&mut self, text: &str) {
-        self.answer_at(self.now + self.config.delay, text);
+    fn queue_reply(&mut self, text: &str) {
+        self.queue_reply_at(self.now + self.config.delay, text);
     }
 
-    fn answer_at(&mut self, at: Duration, text: &str) {
+    fn queue_reply_at(&mut self, at: Duration, text: &str) {
         if self.mode != Mode::Silent {
             self.answers.extend(text.bytes().map(|byte| (at, byte)));
         }
@@ -446,10 +446,10 @@ impl State {
     }
 
     fn take_answers(&mut self) -> Vec<u8> {
-        self.take_some(usize::MAX)
+        self.take_bytes(usize::MAX)
     }
 
-    fn take_some(&mut self, most: usize) -> Vec<u8> {
+    fn take_bytes(&mut self, most: usize) -> Vec<u8> {
         let count = self.answers.iter().take(most).take_while(|(at, _)| *at <= self.now).count();
         self.answers.drain(..count).map(|(_, byte)| byte).collect()
     }
@@ -461,7 +461,7 @@ impl State {
             }
             match (self.firmware, byte) {
                 (Firmware::Grbl, b'?') => self.answer_status(),
-                (Firmware::Grbl, b'!') => self.hold(),
+                (Firmware::Grbl, b'!') => self.feed_hold(),
                 (Firmware::Grbl, 0x18) => self.soft_reset(),
                 (_, b'\n') => {
                     let line = String::from_utf8_lossy(&self.received).trim().to_owned();
@@ -499,7 +499,7 @@ impl State {
                 let answer = answer.clone();
                 self.wait = None;
                 self.rest_if_done();
-                self.answer(&answer);
+                self.queue_reply(&answer);
                 continue;
             }
             self.rest_if_done();
@@ -538,9 +538,9 @@ impl State {
         if line == "M112" {
             self.mode = Mode::Halted;
             self.note_stop();
-            self.answer("Error:Printer halted. kill() called!\n");
+            self.queue_reply("Error:Printer halted. kill() called!\n");
         } else if self.mode == Mode::Ready {
-            self.answer("ok\n");
+            self.queue_reply("ok\n");
         }
     }
 
@@ -548,7 +548,7 @@ impl State {
         self.stopped_at.get_or_insert(self.now);
     }
 
-    fn hold(&mut self) {
+    fn feed_hold(&mut self) {
         if matches!(self.mode, Mode::Ready | Mode::Silent) {
             self.at_m = self.machine_m();
             (self.motion, self.wait) = (None, None);
@@ -568,7 +568,7 @@ impl State {
         self.freeze();
         self.answers.clear();
         self.mode = if is_kept { Mode::Ready } else { Mode::Alarm };
-        self.answer("\r\nGrbl 1.1h ['$' for help]\r\n");
+        self.queue_reply("\r\nGrbl 1.1h ['$' for help]\r\n");
     }
 
     fn answer_status(&mut self) {
@@ -580,7 +580,7 @@ impl State {
             Mode::Ready => "Idle",
         };
         let [x_mm, y_mm, z_mm] = self.machine_m().map(|at_m| at_m * 1e3);
-        self.answer(&format!(
+        self.queue_reply(&format!(
             "<{state}|MPos:{x_mm:.3},{y_mm:.3},{z_mm:.3}|FS:0,0|WCO:0.000,0.000,0.000>\r\n"
         ));
     }
@@ -596,13 +596,13 @@ impl State {
                 self.fail(kind, line);
                 self.faults_met += 1;
             }
-            None => self.obey(line),
+            None => self.execute_command(line),
         }
     }
 
     fn due_fault(&mut self, line: &str) -> Option<FaultKind> {
         let mut due = None;
-        for (fault, seen) in self.config.faults.iter().zip(&mut self.seen) {
+        for (fault, seen) in self.config.faults.iter().zip(&mut self.line_counts) {
             if line.starts_with(&fault.line) {
                 *seen += 1;
                 if *seen == fault.nth {
@@ -617,12 +617,12 @@ impl State {
         let is_marlin = self.firmware == Firmware::Marlin;
         match kind {
             FaultKind::Unknown if is_marlin => {
-                self.answer(&format!("echo:Unknown command: \"{line}\"\nok\n"));
+                self.queue_reply(&format!("echo:Unknown command: \"{line}\"\nok\n"));
             }
-            FaultKind::Unknown => self.answer("error:20\r\n"),
+            FaultKind::Unknown => self.queue_reply("error:20\r\n"),
             FaultKind::Lost => {}
             FaultKind::Silence => {
-                self.obey(line);
+                self.execute_command(line);
                 self.answers.clear();
                 self.mode = Mode::Silent;
                 if let Some((_, answer)) = &mut self.wait {
@@ -630,36 +630,38 @@ impl State {
                 }
             }
             FaultKind::Resend if is_marlin => {
-                self.answer("Error:Line Number is not Last Line Number+1, Last Line: 0\nResend: 1\nok\n");
+                self.queue_reply(
+                    "Error:Line Number is not Last Line Number+1, Last Line: 0\nResend: 1\nok\n",
+                );
             }
-            FaultKind::Resend => self.answer("error:2\r\n"),
-            FaultKind::HomeFirst if is_marlin => self.answer("echo:Home XYZ First\nok\n"),
+            FaultKind::Resend => self.queue_reply("error:2\r\n"),
+            FaultKind::HomeFirst if is_marlin => self.queue_reply("echo:Home XYZ First\nok\n"),
             FaultKind::HomeFirst => {
                 (self.mode, self.is_homed) = (Mode::Alarm, false);
-                self.answer("error:9\r\n");
+                self.queue_reply("error:9\r\n");
             }
             FaultKind::Error if is_marlin => {
                 self.freeze();
-                self.answer("Error:Printer halted. kill() called!\n");
+                self.queue_reply("Error:Printer halted. kill() called!\n");
                 self.mode = Mode::Halted;
             }
             FaultKind::Error => {
                 self.freeze();
-                self.answer("ALARM:1\r\n[MSG:Reset to continue]\r\n");
+                self.queue_reply("ALARM:1\r\n[MSG:Reset to continue]\r\n");
                 self.mode = Mode::Alarm;
             }
             FaultKind::Reset => self.reset(),
             FaultKind::ResetMoving => {
-                self.obey(line);
+                self.execute_command(line);
                 let end = self.motion.map_or(self.now, |motion| motion.end);
                 self.resets_at = Some(self.now + (end - self.now) / 2);
             }
             FaultKind::Endstop => self.hit_endstop(line),
             FaultKind::ExtraOk => {
-                self.obey(line);
+                self.execute_command(line);
                 match &mut self.wait {
                     Some((_, answer)) => answer.push_str("ok\n"),
-                    None => self.answer("ok\n"),
+                    None => self.queue_reply("ok\n"),
                 }
             }
         }
@@ -667,7 +669,7 @@ impl State {
 
     fn hit_endstop(&mut self, line: &str) {
         let from_m = self.at_m;
-        self.obey(line);
+        self.execute_command(line);
         let missing_m: [f64; 3] = std::array::from_fn(|axis| (self.at_m[axis] - from_m[axis]) / 2.0);
         for (shift_m, missing_m) in self.shift_m.iter_mut().zip(missing_m) {
             *shift_m -= missing_m;
@@ -675,24 +677,24 @@ impl State {
         match self.firmware {
             Firmware::Marlin => {
                 let x_mm = (self.at_m[0] - missing_m[0]) * 1e3;
-                self.answer(&format!("echo:endstops hit:  X:{x_mm:.2}\n"));
+                self.queue_reply(&format!("echo:endstops hit:  X:{x_mm:.2}\n"));
             }
             Firmware::Grbl => {
                 self.freeze();
-                self.answer("ALARM:1\r\n[MSG:Reset to continue]\r\n");
+                self.queue_reply("ALARM:1\r\n[MSG:Reset to continue]\r\n");
                 self.mode = Mode::Alarm;
             }
         }
     }
 
-    fn obey(&mut self, line: &str) {
+    fn execute_command(&mut self, line: &str) {
         match self.firmware {
-            Firmware::Marlin => self.obey_as_marlin(line),
-            Firmware::Grbl => self.obey_as_grbl(line),
+            Firmware::Marlin => self.execute_marlin(line),
+            Firmware::Grbl => self.execute_grbl(line),
         }
     }
 
-    fn obey_as_marlin(&mut self, line: &str) {
+    fn execute_marlin(&mut self, line: &str) {
         match line {
             "" => {}
             "M112" => {
@@ -703,34 +705,36 @@ impl State {
             }
             "M115" => {
                 let parser = u8::from(self.config.emergency_parser);
-                self.answer(&format!(
+                self.queue_reply(&format!(
                     "FIRMWARE_NAME:Marlin 2.1.2 (simulated) SOURCE_CODE_URL:none PROTOCOL_VERSION:1.0\nCap:EEPROM:1\nCap:EMERGENCY_PARSER:{parser}\nok\n"
                 ));
             }
             "M114" => {
                 let [x_mm, y_mm, z_mm] = self.machine_m().map(|at_m| at_m * 1e3);
-                self.answer(&format!("X:{x_mm:.2} Y:{y_mm:.2} Z:{z_mm:.2} E:0.00 Count X:0 Y:0 Z:0\nok\n"));
+                self.queue_reply(&format!(
+                    "X:{x_mm:.2} Y:{y_mm:.2} Z:{z_mm:.2} E:0.00 Count X:0 Y:0 Z:0\nok\n"
+                ));
             }
-            "G21" | "G90" | "M410" => self.answer("ok\n"),
+            "G21" | "G90" | "M410" => self.queue_reply("ok\n"),
             "G28" => self.home(),
             "M400" => self.wait_for_moves(),
-            _ if line.starts_with("M118 ") => self.answer(&format!("{}\nok\n", &line[5..])),
-            _ if line.starts_with("G1 ") => self.go(line),
-            _ => self.answer(&format!("echo:Unknown command: \"{line}\"\nok\n")),
+            _ if line.starts_with("M118 ") => self.queue_reply(&format!("{}\nok\n", &line[5..])),
+            _ if line.starts_with("G1 ") => self.start_move(line),
+            _ => self.queue_reply(&format!("echo:Unknown command: \"{line}\"\nok\n")),
         }
     }
 
-    fn obey_as_grbl(&mut self, line: &str) {
+    fn execute_grbl(&mut self, line: &str) {
         let is_locked = matches!(self.mode, Mode::Alarm | Mode::Halted | Mode::Held);
         match line {
-            "" => self.answer("ok\r\n"),
-            "$I" => self.answer("[VER:1.1h.20190825:]\r\n[OPT:V,15,128]\r\nok\r\n"),
+            "" => self.queue_reply("ok\r\n"),
+            "$I" => self.queue_reply("[VER:1.1h.20190825:]\r\n[OPT:V,15,128]\r\nok\r\n"),
             "$H" if self.mode != Mode::Held => self.home(),
-            _ if is_locked => self.answer("error:9\r\n"),
-            "G21" | "G90" | "G94" | "G54" => self.answer("ok\r\n"),
-            _ if line.starts_with("G1 ") => self.go(line),
+            _ if is_locked => self.queue_reply("error:9\r\n"),
+            "G21" | "G90" | "G94" | "G54" => self.queue_reply("ok\r\n"),
+            _ if line.starts_with("G1 ") => self.start_move(line),
             _ if line.starts_with("G4 ") => self.wait_for_moves(),
-            _ => self.answer("error:20\r\n"),
+            _ => self.queue_reply("error:20\r\n"),
         }
     }
 
@@ -750,26 +754,26 @@ impl State {
         if self.firmware == Firmware::Marlin {
             let mut busy = self.now + BUSY_EVERY;
             while busy < end {
-                self.answer_at(busy, "echo:busy: processing\n");
+                self.queue_reply_at(busy, "echo:busy: processing\n");
                 busy += BUSY_EVERY;
             }
         }
         self.wait = Some((end, "ok\r\n".to_owned()));
     }
 
-    fn go(&mut self, line: &str) {
+    fn start_move(&mut self, line: &str) {
         let (mut to_m, mut speed_m_per_s) = (self.at_m, f64::INFINITY);
         for word in line.split_ascii_whitespace().skip(1) {
             let (Some(axis), Ok(value)) = (word.chars().next(), word.get(1..).unwrap_or("").parse::<f64>())
             else {
-                return self.answer("Error:number\n");
+                return self.queue_reply("Error:number\n");
             };
             match axis {
                 'X' => to_m[0] = value * 1e-3,
                 'Y' => to_m[1] = value * 1e-3,
                 'Z' => to_m[2] = value * 1e-3,
                 'F' if value > 0.0 => speed_m_per_s = value / 60e3,
-                _ => return self.answer("Error:word\n"),
+                _ => return self.queue_reply("Error:word\n"),
             }
         }
         if let Some(limits_m) = self.config.soft_limits_m {
@@ -777,13 +781,13 @@ impl State {
                 std::array::from_fn(|axis| to_m[axis].clamp(limits_m[axis].0, limits_m[axis].1));
             if self.firmware == Firmware::Grbl && within_m != to_m {
                 self.mode = Mode::Alarm;
-                return self.answer("ALARM:2\r\n[MSG:Reset to continue]\r\n");
+                return self.queue_reply("ALARM:2\r\n[MSG:Reset to continue]\r\n");
             }
             to_m = within_m;
         }
         let lifts = to_m[..2] == self.at_m[..2] && to_m[2] >= self.at_m[2];
         if (self.faults_met > 0 || !self.is_homed) && !lifts {
-            self.doubtful_moves += 1;
+            self.unsafe_moves += 1;
         }
         let from_m = self.machine_m();
         let start = self.motion.map_or(self.now, |motion| motion.end).max(self.now);
@@ -793,6 +797,6 @@ impl State {
             self.motion = Some(Motion { from_m, to_m, start, end: start + time });
         }
         self.at_m = to_m;
-        self.answer("ok\r\n");
+        self.queue_reply("ok\r\n");
     }
 }

@@ -37,7 +37,7 @@ pub enum Order {
 
 /// State after an order, and position in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Done {
+pub enum StagePosition {
     /// Lifted.
     Up([f64; 3]),
     /// Below the height of travel.
@@ -50,7 +50,7 @@ pub struct StageThread {
     firmware: Firmware,
     stopping: Stopping,
     orders: Option<Sender<Order>>,
-    done: Receiver<Result<Done, StageError>>,
+    done: Receiver<Result<StagePosition, StageError>>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
@@ -94,7 +94,7 @@ impl StageThread {
     }
 
     /// Outcome of the orders, once done.
-    pub fn done(&self) -> Option<Result<Done, StageError>> {
+    pub fn done(&self) -> Option<Result<StagePosition, StageError>> {
         self.done.try_recv().ok()
     }
 
@@ -138,11 +138,11 @@ impl Drop for StageThread {
 fn run(
     mut machine: GcodeStage<Box<dyn StageLink>>,
     orders: &Receiver<Order>,
-    tell: &Sender<Result<Done, StageError>>,
+    tell: &Sender<Result<StagePosition, StageError>>,
 ) {
     loop {
         let done = match orders.try_recv() {
-            Ok(order) => obey(&mut machine, order),
+            Ok(order) => execute(&mut machine, order),
             // Reads for unexpected lines, and obeys a stop.
             Err(TryRecvError::Empty) => match machine.watch() {
                 Ok(()) => continue,
@@ -150,7 +150,7 @@ fn run(
             },
             Err(TryRecvError::Disconnected) => {
                 // The thread may end because of the stop.
-                let _ = machine.heed_stop();
+                let _ = machine.halt_if_requested();
                 return;
             }
         };
@@ -161,7 +161,7 @@ fn run(
     }
 }
 
-fn obey(machine: &mut GcodeStage<Box<dyn StageLink>>, order: Order) -> Result<Done, StageError> {
+fn execute(machine: &mut GcodeStage<Box<dyn StageLink>>, order: Order) -> Result<StagePosition, StageError> {
     match order {
         Order::Home => machine.home()?,
         Order::Travel(position) => machine.travel(position)?,
@@ -175,7 +175,7 @@ fn obey(machine: &mut GcodeStage<Box<dyn StageLink>>, order: Order) -> Result<Do
     }
     let at_m = machine.position_m().ok_or(StageError::NotHomed)?;
     Ok(match order {
-        Order::Press { .. } | Order::Lower(_) => Done::Down(at_m),
-        Order::Home | Order::Travel(_) | Order::Lift | Order::Jog(_) => Done::Up(at_m),
+        Order::Press { .. } | Order::Lower(_) => StagePosition::Down(at_m),
+        Order::Home | Order::Travel(_) | Order::Lift | Order::Jog(_) => StagePosition::Up(at_m),
     })
 }

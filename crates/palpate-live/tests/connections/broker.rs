@@ -2,7 +2,7 @@
 
 use crate::bench::{Bench, PATIENCE, lines};
 use palpate_estimators::fit::{Fit, FitTask};
-use palpate_live::input::{Arrival, Arrived, Command as SessionCommand, Input};
+use palpate_live::input::{Arrival, Command as SessionCommand, Input, TimedArrival};
 use palpate_live::rules::Rules;
 use palpate_live::session::{Session, SessionConfig};
 use palpate_live::simulated_board::{BoardConfig, Finger, SimulatedBoard};
@@ -172,7 +172,7 @@ impl Bridge<'_> {
         for _ in 0..frames {
             let arrival = Arrival::Bytes(self.board.send_until(self.board.next_at()));
             let mut outputs = Vec::new();
-            self.session.receive(&Arrived { at: self.clock.now(), arrival }, &mut outputs);
+            self.session.receive(&TimedArrival { at: self.clock.now(), arrival }, &mut outputs);
             let batch = Arc::new(Batch { outputs });
             samples += batch.samples().count();
             self.sink.batch(&batch);

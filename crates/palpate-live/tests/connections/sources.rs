@@ -124,7 +124,7 @@ fn a_server_that_goes_away_is_connected_to_again() {
 
 /// Rules that act too often: the number of commands is bounded, and unsent ones are reported once per cause.
 #[test]
-fn commands_of_rules_are_bounded_and_what_is_not_sent_is_told() {
+fn commands_of_rules_are_bounded_and_unsent_ones_reported() {
     let server = TcpListener::bind("127.0.0.1:0").unwrap();
     let bench = Bench::open(&format!("tcp://{}", server.local_addr().unwrap()));
     let (board, _) = server.accept().unwrap();

@@ -77,7 +77,7 @@ impl Bench {
                     }
                     None => was_there = false,
                 }
-                board.finger_mut().hold(machine.contact());
+                board.finger_mut().set_contact(machine.contact());
                 while board.next_at() <= clock.elapsed() {
                     if let Some(frame) = board.next_frame() {
                         to.send(&frame).unwrap();
@@ -223,7 +223,7 @@ fn a_machine_that_ends_early_lifts_its_finger() {
 }
 
 #[test]
-fn a_machine_that_nobody_watches_lifts_its_finger_and_ends() {
+fn unattended_machine_lifts_its_finger_and_ends() {
     let (folder, bench) = (tempfile::tempdir().unwrap(), Bench::start());
     // More presses than fit into the time after which the user counts as absent.
     let rig = rig_with_repeats(20);
@@ -360,7 +360,7 @@ fn ends_with_its_words(firmware: Firmware, case: &FaultCase, words: &str) {
     assert!(problem.contains(words) && problem.contains(case.finger), "{name}");
     assert!(problem.contains("reset it"), "the remedy of {name}");
     assert_eq!(ended["taken"], case.taken, "{name}");
-    assert_eq!(bench.machine.doubtful_moves(), 0, "{name}");
+    assert_eq!(bench.machine.unsafe_moves(), 0, "{name}");
     // A Marlin that halts by itself reads no stop any more.
     assert!(bench.machine.is_stopped() || case.config.starts_with("error@"), "{name}");
     assert!(case.finger == UNKNOWN || bench.machine.contact().is_none(), "{name}");
@@ -379,7 +379,7 @@ fn reset_at_rest_ends_the_run() {
         let ended = waited(&server, |state| state["machine"]["runs"] == false);
         let problem = ended["problem"].as_str().unwrap_or_default();
         assert!(problem.contains("the machine was reset: it sent `"), "{firmware:?}: {problem}");
-        assert_eq!(bench.machine.doubtful_moves(), 0, "{firmware:?}: {problem}");
+        assert_eq!(bench.machine.unsafe_moves(), 0, "{firmware:?}: {problem}");
         live.end();
     });
 }
@@ -469,7 +469,7 @@ fn a_machine_that_is_set_up_stops_as_one_that_presses() {
         let ended = waited(&server, |state| state["phase"] == "ready");
         let problem = ended["problem"].as_str().unwrap();
         assert!(problem.contains("to `G1 Z26.700 ") && problem.contains(LIFTED), "{firmware:?}: {problem}");
-        assert!(bench.machine.is_stopped() && bench.machine.doubtful_moves() == 0);
+        assert!(bench.machine.is_stopped() && bench.machine.unsafe_moves() == 0);
         live.end();
 
         let (_folder, bench, live, server) = down("");
@@ -482,7 +482,7 @@ fn a_machine_that_is_set_up_stops_as_one_that_presses() {
 }
 
 #[test]
-fn what_cannot_be_done_is_told_with_a_remedy() {
+fn impossible_requests_are_refused_with_a_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let (live, server) = served(folder.path(), "udp://127.0.0.1:47613", Some("gcode:tcp://127.0.0.1:1"));
     for body in ["", "{", "{}", r#"{"step":"press"}"#, r#"{"step":1}"#] {

@@ -230,7 +230,7 @@ fn a_browser_that_sends_too_much_is_let_go() {
 }
 
 #[test]
-fn a_browser_that_says_goodbye_is_answered() {
+fn close_frame_of_a_browser_is_answered() {
     let (live, server) = served(None);
     for query in ["", "?form=binary"] {
         let mut socket = follow(&server, query, None).unwrap();
@@ -244,7 +244,7 @@ fn a_browser_that_says_goodbye_is_answered() {
 }
 
 #[test]
-fn a_browser_that_never_reads_costs_the_others_nothing() {
+fn browser_that_never_reads_does_not_delay_others() {
     let (live, server) = served(None);
     let _slow: Vec<_> = (0..3).map(|_| follow(&server, "?rate=all", None).unwrap()).collect();
     let mut quick = follow(&server, "?rate=all", None).unwrap();

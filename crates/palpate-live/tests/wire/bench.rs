@@ -2,7 +2,7 @@
 
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::fit::{Fit, FitTask};
-use palpate_live::input::{Arrival, Arrived, Command, Input};
+use palpate_live::input::{Arrival, Command, Input, TimedArrival};
 use palpate_live::session::{Session, SessionConfig};
 use palpate_live::simulated_board::{BoardConfig, Finger, SimulatedBoard};
 use palpate_live::sink::{Batch, Sink};
@@ -48,7 +48,7 @@ impl<'a> Bench<'a> {
         for _ in 0..frames {
             let arrival = Arrival::Bytes(self.board.send_until(self.board.next_at()));
             let mut outputs = Vec::new();
-            self.session.receive(&Arrived { at: self.clock.now(), arrival }, &mut outputs);
+            self.session.receive(&TimedArrival { at: self.clock.now(), arrival }, &mut outputs);
             if !outputs.is_empty() {
                 let batch = Arc::new(Batch { outputs });
                 sink.batch(&batch);
@@ -61,7 +61,7 @@ impl<'a> Bench<'a> {
 }
 
 /// The next problem that a sink reports.
-pub fn trouble(told: &Receiver<Input>) -> String {
+pub fn next_problem(told: &Receiver<Input>) -> String {
     match told.recv_timeout(PATIENCE) {
         Ok(Input::Command(Command::Trouble(text))) => text,
         other => panic!("{other:?}"),

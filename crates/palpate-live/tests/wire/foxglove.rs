@@ -228,7 +228,7 @@ fn a_session_that_begins_anew_keeps_the_topics() {
 }
 
 #[test]
-fn an_app_that_never_reads_holds_nobody_up() {
+fn app_that_never_reads_does_not_delay_others() {
     let server = FoxgloveServer::start(loopback()).unwrap();
     let (rig, locator) = fitted();
     let mut bench = Bench::new(&rig, &locator);
@@ -249,7 +249,7 @@ fn an_app_that_never_reads_holds_nobody_up() {
 }
 
 #[test]
-fn what_cannot_be_served_is_refused() {
+fn unusable_address_is_refused() {
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap();
     let error = FoxgloveServer::start(address).err().unwrap().to_string();

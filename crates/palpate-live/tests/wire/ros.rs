@@ -1,6 +1,6 @@
 //! ROS 2 through Zenoh: a router and a subscriber over TCP, as for nodes of `rmw_zenoh_cpp`.
 
-use crate::bench::{Bench, PATIENCE, fitted, trouble};
+use crate::bench::{Bench, PATIENCE, fitted, next_problem};
 use palpate_live::sink::Batch;
 use palpate_live::sink::ros::{RosMessage, RosSink, RosUrl, TOPICS, Topic, messages};
 use std::net::TcpListener;
@@ -108,11 +108,11 @@ fn nodes_get_every_message_and_a_router_that_begins_anew_is_found_again() {
     let mut sink = RosSink::new(&url, bench.session.channels(), bench.session.extent(), reports).unwrap();
 
     // Without a router all messages are lost, and this is reported once.
-    let text = trouble(&told);
+    let text = next_problem(&told);
     assert!(text.contains(&format!("tcp/127.0.0.1:{port} cannot be reached")), "{text}");
     let early: usize = bench.send(50, &mut sink).iter().map(|batch| batch.outputs.len()).sum();
     let router = zenoh("router", "listen/endpoints", port);
-    let text = trouble(&told);
+    let text = next_problem(&told);
     assert!(text.contains("is there again"), "{text}");
     assert_eq!(sink.lost(), early as u64);
 
@@ -155,11 +155,11 @@ fn nodes_get_every_message_and_a_router_that_begins_anew_is_found_again() {
     // The router ends, and another begins at its address.
     drop(subscriber);
     router.close().wait().unwrap();
-    let text = trouble(&told);
+    let text = next_problem(&told);
     assert!(text.contains("cannot be reached; it is tried again"), "{text}");
     let away: usize = bench.send(200, &mut sink).iter().map(|batch| batch.outputs.len()).sum();
     let _router = zenoh("router", "listen/endpoints", port);
-    let text = trouble(&told);
+    let text = next_problem(&told);
     assert!(text.contains("is there again"), "{text}");
     assert_eq!(sink.lost(), (early + away) as u64);
     let subscriber = Subscriber::connect(port, "5/bench/left/**", "@ros2_lv/5/**");
@@ -196,7 +196,7 @@ fn a_peer_without_a_router_will_do() {
 }
 
 #[test]
-fn a_sink_ends_soon_whoever_does_not_answer() {
+fn sink_ends_soon_without_answers() {
     let silent = TcpListener::bind("127.0.0.1:0").unwrap();
     let (rig, locator) = fitted();
     let mut bench = Bench::new(&rig, &locator);

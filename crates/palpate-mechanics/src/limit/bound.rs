@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_that_say_the_same_are_singular() {
+    fn linearly_dependent_columns_are_singular() {
         let column = vec![1.0, 2.0, 3.0];
         let twice: Vec<f64> = column.iter().map(|value| 2.0 * value).collect();
         assert_eq!(inverse_information([column.clone(), twice]), None);

@@ -61,7 +61,7 @@ pub struct LimitSummary {
     /// Largest limit.
     pub worst: (Position, f64),
     /// Number of positions without a bound.
-    pub without: usize,
+    pub unidentifiable: usize,
 }
 
 /// Returns positions with a spacing, also from the edge.
@@ -110,7 +110,7 @@ impl LimitCurve {
     }
 
     /// Formats positions without a bound: "1 of 399 positions, 0.3 %, at 12000 mm".
-    pub fn not_told_in_words(&self) -> Option<String> {
+    pub fn unidentifiable_text(&self) -> Option<String> {
         const MOST_NAMED: usize = 3;
         let places: Vec<String> = self
             .points
@@ -141,7 +141,7 @@ impl LimitCurve {
             mean_error_m: mean(Bound::mean_error_m),
             best: bounds.first().map(limit)?,
             worst: bounds.last().map(limit)?,
-            without: self.points.len() - bounds.len(),
+            unidentifiable: self.points.len() - bounds.len(),
         })
     }
 }

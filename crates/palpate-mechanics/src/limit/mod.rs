@@ -151,7 +151,7 @@ impl<'a> CramerRaoBound<'a> {
 
     /// Estimates the cost over a surface and at `others` further contacts.
     pub fn cost(surface: &dyn Surface, layout: &Layout, others: usize) -> LimitCost {
-        let alive = layout.sensors().iter().filter(|sensor| !sensor.channel.dead).count();
+        let alive = layout.sensors().iter().filter(|sensor| !sensor.channel.disabled).count();
         Responses::cost(surface, alive, Grid::over_surface(surface.extent()).positions.len() + others)
     }
 
@@ -170,14 +170,14 @@ impl<'a> CramerRaoBound<'a> {
     }
 
     /// Number of active sensors.
-    pub fn alive(&self) -> usize {
+    pub fn enabled_count(&self) -> usize {
         self.channels.len()
     }
 
     /// Returns the bound at a contact; `None` for singular Fisher information, as over a support with an
     /// unknown force.
     pub fn bound_at(&self, contact: Contact, force: Force) -> Option<Bound> {
-        let Columns { force: by_force, along, across } = self.derivatives(contact);
+        let Columns { force: by_force, along, y: across } = self.derivatives(contact);
         let least = SILENT * self.full_scale;
         let is_silent =
             |by_place: &Vec<f64>| norm(by_place) * self.extent.length_m() <= least * contact.force_n;
@@ -214,7 +214,7 @@ impl<'a> CramerRaoBound<'a> {
         let mut each = self.responses.readings(positions, force_n);
         for readings in &mut each {
             for (reading, channel) in readings.iter_mut().zip(&self.channels) {
-                *reading = channel.held(*reading) / channel.sd;
+                *reading = channel.saturate(*reading) / channel.sd;
             }
         }
         each
@@ -243,13 +243,13 @@ impl<'a> CramerRaoBound<'a> {
             columns.along.push(weight * along_x);
             across.push(weight * along_y);
         }
-        columns.across = self.extent.if_plane(across);
+        columns.y = self.extent.if_plane(across);
         columns
     }
 }
 
 impl Channel {
-    fn held(&self, reading: f64) -> f64 {
+    fn saturate(&self, reading: f64) -> f64 {
         self.range.map_or(reading, |(low, high)| reading.max(low).min(high))
     }
 }
@@ -259,7 +259,7 @@ impl Channel {
 struct Columns {
     force: Vec<f64>,
     along: Vec<f64>,
-    across: Option<Vec<f64>>,
+    y: Option<Vec<f64>>,
 }
 
 /// Error of a bench without a bound.

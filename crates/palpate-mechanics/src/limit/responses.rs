@@ -37,15 +37,15 @@ pub struct LimitCost {
 #[derive(Clone)]
 pub(super) enum Responses<'a> {
     BySensor(Vec<Arc<dyn ResponseFunction + 'a>>),
-    ByContact(ByContact<'a>),
+    ByContact(ResponseCache<'a>),
 }
 
 #[derive(Clone)]
-pub(super) struct ByContact<'a> {
+pub(super) struct ResponseCache<'a> {
     readings: Arc<dyn ReadingsByContact + 'a>,
     sensors: usize,
     /// Influences by [`key`].
-    kept: Arc<Mutex<HashMap<[u64; 2], Arc<Influences>>>>,
+    influences: Arc<Mutex<HashMap<[u64; 2], Arc<Influences>>>>,
     /// Readings by degree of freedom.
     degrees: Arc<Mutex<HashMap<usize, Vec<f64>>>>,
 }
@@ -61,16 +61,16 @@ impl<'a> Responses<'a> {
         most: usize,
         watch: Watch,
     ) -> Result<Self, Cancelled> {
-        let alive = layout.sensors().iter().filter(|sensor| !sensor.channel.dead);
+        let alive = layout.sensors().iter().filter(|sensor| !sensor.channel.disabled);
         let sensors: Vec<(SensorKind, Position)> =
             alive.map(|sensor| (sensor.kind, sensor.position)).collect();
         if sensors.len() > most
             && let Some(readings) = surface.readings_by_contact(&sensors)
         {
-            return Ok(Self::ByContact(ByContact {
+            return Ok(Self::ByContact(ResponseCache {
                 readings,
                 sensors: sensors.len(),
-                kept: Arc::default(),
+                influences: Arc::default(),
                 degrees: Arc::default(),
             }));
         }
@@ -138,10 +138,10 @@ impl<'a> Responses<'a> {
     }
 }
 
-impl ByContact<'_> {
+impl ResponseCache<'_> {
     fn readings(&self, positions: &[Position], force_n: f64) -> Vec<Vec<f64>> {
         let of = |position: &Position| {
-            let mut readings = match self.kept(*position) {
+            let mut readings = match self.cached_influences(*position) {
                 Some(kept) => kept[0].clone(),
                 None => self.interpolated(*position),
             };
@@ -160,7 +160,7 @@ impl ByContact<'_> {
         let new = around.iter().map(|(degree, _)| *degree).filter(|degree| !degrees.contains_key(degree));
         let new: Vec<usize> = new.collect();
         let loads: Vec<ContactLoad> = new.iter().copied().map(ContactLoad::Degree).collect();
-        degrees.extend(new.into_iter().zip(self.readings.under(&loads)));
+        degrees.extend(new.into_iter().zip(self.readings.readings_of_loads(&loads)));
         let mut sum = vec![0.0; self.sensors];
         for (degree, weight) in &around {
             if let Some(readings) = degrees.get(degree) {
@@ -171,7 +171,7 @@ impl ByContact<'_> {
     }
 
     fn gradients(&self, Contact { position, force_n }: Contact) -> Vec<(f64, ResponseGradient)> {
-        let influences = self.kept(position).unwrap_or_else(|| self.solved(position));
+        let influences = self.cached_influences(position).unwrap_or_else(|| self.solved(position));
         let [at, along, across] = &*influences;
         let gradient = |((at, along), across): ((&f64, &f64), &f64)| {
             let position = [force_n * along, force_n * across];
@@ -191,17 +191,17 @@ impl ByContact<'_> {
         })
     }
 
-    fn kept(&self, position: Position) -> Option<Arc<Influences>> {
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner).get(&key(position)).cloned()
+    fn cached_influences(&self, position: Position) -> Option<Arc<Influences>> {
+        self.influences.lock().unwrap_or_else(PoisonError::into_inner).get(&key(position)).cloned()
     }
 
     fn has_room(&self) -> bool {
-        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner).len();
+        let kept = self.influences.lock().unwrap_or_else(PoisonError::into_inner).len();
         (kept + 1) * 3 * size_of::<f64>() * self.sensors <= MOST_KEPT
     }
 
     fn keep(&self, position: Position, influences: Arc<Influences>) {
-        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.influences.lock().unwrap_or_else(PoisonError::into_inner);
         kept.insert(key(position), influences);
     }
 

@@ -41,7 +41,7 @@ fn warnings(layout: &Layout, force: Force) -> Vec<LimitWarning> {
 }
 
 #[test]
-fn over_a_support_an_unknown_force_is_not_told_and_left_out_of_the_summary() {
+fn unknown_force_over_a_support_is_unidentifiable_and_not_in_the_summary() {
     let simple = |at_m| BeamSupport { at_m, kind: BeamSupportKind::Simple };
     let beam = SupportedBeam::new(SupportedBeamSpec {
         length_m: 24.0,
@@ -58,8 +58,8 @@ fn over_a_support_an_unknown_force_is_not_told_and_left_out_of_the_summary() {
         assert!(at(12.0, Force::Known).is_some() && at(11.94, Force::Unknown).is_some(), "{kind}");
         let curve = LimitCurve::over_surface(&limit, 1e3, Force::Unknown).unwrap();
         let summary = curve.summary().unwrap();
-        assert_eq!(summary.without, 1);
-        assert_eq!(curve.not_told_in_words().unwrap(), "1 of 399 positions, 0.3 %, at 12000 mm");
+        assert_eq!(summary.unidentifiable, 1);
+        assert_eq!(curve.unidentifiable_text().unwrap(), "1 of 399 positions, 0.3 %, at 12000 mm");
         // The limit grows towards the support: its minimum is not over the support.
         let beside = at(11.94, Force::Unknown).unwrap().sd_position_m;
         assert!(summary.best.1 < beside && (summary.best.0.x_m - 12.0).abs() > 1.0, "{summary:?}");
@@ -96,7 +96,7 @@ fn the_papers_beam_has_the_limits_that_the_paper_leaves_room_for() {
     assert!((ratio - std::f64::consts::FRAC_2_PI.sqrt()).abs() < 1e-9);
     assert_eq!(format!("{:.0} mm", summary.worst.0.x_m * 1e3), "200 mm");
     assert!(summary.best.1 <= summary.median_m && summary.median_m <= summary.mean_m);
-    assert_eq!(summary.without, 0);
+    assert_eq!(summary.unidentifiable, 0);
 }
 
 #[test]
@@ -195,7 +195,7 @@ fn a_plane_has_a_bound_in_both_directions() {
     let positions = positions_with_spacing(Pad.extent(), 5e-3).unwrap();
     let curve = LimitCurve::at_positions(&limit, 2.0, Force::Known, &positions).unwrap();
     assert_eq!(curve.points.len(), 11 * 7);
-    assert_eq!(curve.summary().unwrap().without, 11);
+    assert_eq!(curve.summary().unwrap().unidentifiable, 11);
     // A figure by x is the mean across; every column has a position without a bound.
     let by_x = curve.by_x(|bound| bound.sd_position_m);
     assert_eq!(by_x.len(), 11);
@@ -229,7 +229,7 @@ fn most_likely(limit: &CramerRaoBound, reading: &[f64], near_m: f64, step_m: f64
 }
 
 #[test]
-fn maximum_likelihood_spreads_as_the_limit_says() {
+fn maximum_likelihood_scatter_equals_the_bound() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(20);
     let limit = bound(&deflections(8));
     const DRAWS: usize = 4000;
@@ -283,15 +283,15 @@ proptest! {
 }
 
 #[test]
-fn a_dead_channel_counts_as_if_it_were_not_there() {
+fn disabled_channel_equals_an_absent_one() {
     let mut dead = deflections(8);
-    dead.set_dead(2, true);
+    dead.set_disabled(2, true);
     // A dead channel needs no noise.
     dead.edit(|sensors| sensors[2].channel.noise_sd = 0.0).unwrap();
     let mut without = deflections(8);
     without.edit(|sensors| drop(sensors.remove(2))).unwrap();
     let (dead, without) = (bound(&dead), bound(&without));
-    assert_eq!(dead.alive(), 7);
+    assert_eq!(dead.enabled_count(), 7);
     for force in [Force::Known, Force::Unknown] {
         assert_eq!(sd_mm(&dead, 130.0, force), sd_mm(&without, 130.0, force));
     }
@@ -314,7 +314,7 @@ fn quantisation_is_noise_of_a_twelfth_of_its_square() {
 }
 
 #[test]
-fn a_saturated_channel_tells_nothing_where_it_is_saturated() {
+fn saturated_channel_has_no_information() {
     let mut saturating = deflections(8);
     saturating.edit(|sensors| sensors[3].channel.range = Some((-1e-3, 1e-3))).unwrap();
     let mut without = deflections(8);
@@ -329,12 +329,12 @@ fn a_saturated_channel_tells_nothing_where_it_is_saturated() {
 }
 
 #[test]
-fn what_has_no_limit_says_why() {
+fn missing_limit_has_a_reason() {
     let clean = with_noise(deflections(8), 0.0);
     let mut one_clean = deflections(8);
     one_clean.edit(|sensors| sensors[4].channel.noise_sd = 0.0).unwrap();
     let mut dead = deflections(2);
-    dead.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.dead = true)).unwrap();
+    dead.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.disabled = true)).unwrap();
     let said = |layout: &Layout| CramerRaoBound::new(&*BEAM, layout).err().unwrap().to_string();
     let no_model = LimitError::NoModel.to_string();
     let limit = bound(&deflections(8));
@@ -384,7 +384,7 @@ fn with_an_unknown_force_the_papers_beam_is_blind_next_to_its_supports() {
 }
 
 #[test]
-fn one_sensor_at_mid_span_cannot_tell_left_from_right() {
+fn one_sensor_at_mid_span_cannot_distinguish_left_from_right() {
     insta::assert_snapshot!(words(&warnings(&deflections(1), Force::Known)));
 }
 
@@ -394,7 +394,7 @@ fn loud_sensors_miss_contacts_next_to_the_supports() {
 }
 
 #[test]
-fn reactions_see_what_deflections_do_not() {
+fn reactions_are_sensitive_where_deflections_are_not() {
     let mut layout = deflections(8);
     let mut supports = with_noise(Layout::even(SensorKind::Reaction, 2, 0.4), 0.01);
     supports.edit(|sensors| sensors[0].position = Position::along(0.0)).unwrap();
@@ -413,7 +413,7 @@ fn many_sensors_solved_for_by_contact_have_the_limit_of_their_functions() {
             let [x_m, y_m] = [0.05 * (i % 6 + 1) as f64 - 0.025, 0.04 * (i / 6 + 1) as f64 - 0.02];
             sensor.position = Position { x_m, y_m };
         }
-        sensors[7].channel.dead = true;
+        sensors[7].channel.disabled = true;
         sensors[8].channel.range = Some((-1e-4, 1e-4));
     };
     layout.edit(spread).unwrap();

@@ -60,7 +60,8 @@ impl<'a> TwinSearch<'a> {
         let place = |(i, shape): (usize, &Shape)| {
             let slopes = search.slopes(positions[i], shape);
             let apart = |j: usize| [positions[j].x_m - positions[i].x_m, positions[j].y_m - positions[i].y_m];
-            let bent = |j: usize| left_of(&slopes, apart(j), &difference(&shapes[j].values, &shape.values));
+            let bent =
+                |j: usize| squared_residual(&slopes, apart(j), &difference(&shapes[j].values, &shape.values));
             let spreads = search.grid.neighbours(i).map(|j| distance(&shape.values, &shapes[j].values));
             Place {
                 spread: spreads.fold(0.0, f64::max),
@@ -88,7 +89,7 @@ impl<'a> TwinSearch<'a> {
         let twins = starts.map(|i| self.descend(&target, self.grid.positions[i], distances[i]));
         twins
             .filter(|twin| {
-                twin.distance <= AMBIGUOUS_DISTANCE && self.apart(&target, position, twin.position)
+                twin.distance <= AMBIGUOUS_DISTANCE && self.is_separated(&target, position, twin.position)
             })
             .min_by(|a, b| a.distance.total_cmp(&b.distance))
     }
@@ -101,8 +102,8 @@ impl<'a> TwinSearch<'a> {
         }
         let left = difference(&target.values, &place.shape.values);
         let most_m = REACH * self.grid.pitch_m();
-        let step_m = foretold_step(&place.slopes, &left).map(|step_m| step_m.clamp(-most_m, most_m));
-        scale * (left_of(&place.slopes, step_m, &left) - place.bend) <= AMBIGUOUS_DISTANCE
+        let step_m = predicted_step(&place.slopes, &left).map(|step_m| step_m.clamp(-most_m, most_m));
+        scale * (squared_residual(&place.slopes, step_m, &left) - place.bend) <= AMBIGUOUS_DISTANCE
     }
 
     fn shape(&self, position: Position) -> Shape {
@@ -122,7 +123,7 @@ impl<'a> TwinSearch<'a> {
     }
 
     fn slopes(&self, position: Position, shape: &Shape) -> [Vec<f64>; 2] {
-        let Columns { along, across, .. } =
+        let Columns { along, y: across, .. } =
             self.limit.derivatives(Contact { position, force_n: self.force_n });
         let mut slopes = [along, across.unwrap_or_default()];
         if self.force == Force::Unknown && shape.length > 0.0 {
@@ -179,7 +180,7 @@ impl<'a> TwinSearch<'a> {
         twin
     }
 
-    fn apart(&self, target: &Shape, from: Position, to: Position) -> bool {
+    fn is_separated(&self, target: &Shape, from: Position, to: Position) -> bool {
         let mut shares: Vec<f64> =
             (1..=WAY_POINTS).map(|i| f64::from(i) / f64::from(WAY_POINTS + 1)).collect();
         shares.sort_by(|a, b| (a - 0.5).abs().total_cmp(&(b - 0.5).abs()));
@@ -192,13 +193,13 @@ impl<'a> TwinSearch<'a> {
     }
 }
 
-fn foretold_step([along, across]: &[Vec<f64>; 2], left: &[f64]) -> [f64; 2] {
+fn predicted_step([along, across]: &[Vec<f64>; 2], left: &[f64]) -> [f64; 2] {
     let both = dot(along, across);
     let products = [[dot(along, along), both], [both, dot(across, across)]];
     Ldl::semidefinite(&products).solve([dot(along, left), dot(across, left)])
 }
 
-fn left_of([along, across]: &[Vec<f64>; 2], [dx_m, dy_m]: [f64; 2], difference: &[f64]) -> f64 {
+fn squared_residual([along, across]: &[Vec<f64>; 2], [dx_m, dy_m]: [f64; 2], difference: &[f64]) -> f64 {
     let mut left = difference.to_vec();
     for (slope, step_m) in [(along, dx_m), (across, dy_m)] {
         left.iter_mut().zip(slope).for_each(|(left, slope)| *left -= step_m * slope);

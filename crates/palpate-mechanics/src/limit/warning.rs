@@ -87,9 +87,9 @@ pub fn limit_warnings(
     // Supports are added, as the grid could miss the undetermined positions next to them.
     let grid = Grid::over_surface(limit.extent).including(&force_supports(limit));
     let survey = Survey { limit, force_n, force, grid };
-    let mut warnings = survey.blind();
+    let mut warnings = survey.blind_zones();
     warnings.extend(survey.mirrors(watch)?);
-    warnings.extend(survey.faint());
+    warnings.extend(survey.weak_zones());
     Ok(warnings)
 }
 
@@ -119,7 +119,7 @@ impl Survey<'_> {
         BLIND_SHARE * self.limit.extent.length_m()
     }
 
-    fn blind(&self) -> Vec<LimitWarning> {
+    fn blind_zones(&self) -> Vec<LimitWarning> {
         let extent = self.limit.extent;
         let bound_m = self.blind_from_m();
         let told = |position: Position| self.sd_m(position, self.force);
@@ -204,7 +204,7 @@ impl Survey<'_> {
         Ok(warnings)
     }
 
-    fn faint(&self) -> Vec<LimitWarning> {
+    fn weak_zones(&self) -> Vec<LimitWarning> {
         let extent = self.limit.extent;
         let found = zones(extent, &self.grid, |position| self.signal(position) < FAINT_SIGNAL);
         let warning = |(zone, inside): (Zone, Vec<Position>)| {

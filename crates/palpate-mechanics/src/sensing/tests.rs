@@ -12,7 +12,7 @@ const PERFECT: ChannelModel = ChannelModel {
     offset_error: 0.0,
     position_error_m: 0.0,
     range: None,
-    dead: false,
+    disabled: false,
 };
 
 fn layout(channels: &[ChannelModel]) -> Layout {
@@ -52,10 +52,10 @@ fn every_kind_has_a_unit_of_its_dimension() {
 }
 
 #[test]
-fn quantised_saturated_and_dead_channels_report_what_they_can() {
+fn quantised_saturated_and_disabled_channels_have_their_readings() {
     let coarse = ChannelModel { resolution: 0.5, ..PERFECT };
     let narrow = ChannelModel { range: Some((-1.0, 1.0)), ..PERFECT };
-    let dead = ChannelModel { dead: true, ..PERFECT };
+    let dead = ChannelModel { disabled: true, ..PERFECT };
     assert_eq!(reported(&[coarse, narrow, narrow, dead], &[1.2, -3.0, 0.4, 7.0], 1), [1.0, -1.0, 0.4, 0.0]);
 }
 
@@ -77,7 +77,7 @@ proptest! {
     fn a_fault_of_one_channel_leaves_the_others_as_they_were(seed: u64) {
         let noisy = ChannelModel { noise_sd: 1e-6, gain_error: 0.05, offset_error: 1e-6, ..PERFECT };
         let healthy = reported(&[noisy; 3], &[1e-3; 3], seed);
-        let faulty = reported(&[noisy, ChannelModel { dead: true, ..noisy }, noisy], &[1e-3; 3], seed);
+        let faulty = reported(&[noisy, ChannelModel { disabled: true, ..noisy }, noisy], &[1e-3; 3], seed);
         prop_assert_eq!([healthy[0], healthy[2]], [faulty[0], faulty[2]]);
         prop_assert_eq!(faulty[1], 0.0);
     }

@@ -30,7 +30,7 @@ pub struct SolutionCost {
 
 impl Solving {
     /// Returns the method with fewer solutions.
-    pub const fn sooner(sensors: usize, contacts: usize) -> Self {
+    pub const fn cheaper(sensors: usize, contacts: usize) -> Self {
         if sensors > ContactLoad::EACH * contacts { Self::ByContact } else { Self::BySensor }
     }
 }
@@ -38,17 +38,17 @@ impl Solving {
 /// Readings of many sensors by contact, by reciprocity.
 pub trait ReadingsByContact: Send + Sync {
     /// Returns the readings of all sensors under each load.
-    fn under(&self, loads: &[ContactLoad]) -> Vec<Vec<f64>>;
+    fn readings_of_loads(&self, loads: &[ContactLoad]) -> Vec<Vec<f64>>;
 
     /// Returns a unit force at a contact as loads on degrees of freedom, with factors.
     fn degrees(&self, contact: Position) -> Vec<(usize, f64)>;
 
     /// Number of loads that are fastest together.
-    fn together(&self) -> usize;
+    fn batch_size(&self) -> usize;
     /// Returns the influences at each contact.
     fn influences(&self, contacts: &[Position]) -> Vec<Influences> {
         let loads: Vec<ContactLoad> = contacts.iter().copied().flat_map(ContactLoad::all).collect();
-        let mut under = self.under(&loads).into_iter();
+        let mut under = self.readings_of_loads(&loads).into_iter();
         contacts.iter().map(|_| [(); ContactLoad::EACH].map(|()| under.next().unwrap_or_default())).collect()
     }
 }
@@ -65,7 +65,7 @@ impl dyn ReadingsByContact + '_ {
         watch: Watch,
         mut take: impl FnMut(usize, Influences) -> ControlFlow<()>,
     ) -> Result<(), Cancelled> {
-        let together = (self.together() / ContactLoad::EACH).max(1);
+        let together = (self.batch_size() / ContactLoad::EACH).max(1);
         for (i, batch) in contacts.chunks(together).enumerate() {
             watch.counted(stage, "positions", i * together, contacts.len())?;
             for (k, influences) in self.influences(batch).into_iter().enumerate() {

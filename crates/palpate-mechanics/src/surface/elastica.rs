@@ -144,7 +144,7 @@ impl Elastica {
     /// Position along the straight finger and upward, in metres.
     pub fn point(&self, at_m: f64) -> [f64; 2] {
         let bent_m = at_m.min(self.contact_m);
-        let ([x0, y0], [x1, y1]) = (self.way_to_contact(0.0), self.way_to_contact(bent_m));
+        let ([x0, y0], [x1, y1]) = (self.vector_to_contact(0.0), self.vector_to_contact(bent_m));
         let (sine, cosine) = self.angle(self.contact_m).sin_cos();
         let straight_m = at_m - bent_m;
         [x0 - x1 + straight_m * cosine, -self.sign * (y0 - y1) - straight_m * sine]
@@ -152,7 +152,7 @@ impl Elastica {
 
     /// (S·cos α + C·sin α, S·sin α − C·cos α), with S = ∫ sin ω = ψ′/q and C = ∫ cos ω =
     /// (2·(ℰ − m·sn·cd) − u)/√q.
-    fn way_to_contact(&self, at_m: f64) -> [f64; 2] {
+    fn vector_to_contact(&self, at_m: f64) -> [f64; 2] {
         if self.q == 0.0 {
             return [self.contact_m - at_m, 0.0];
         }

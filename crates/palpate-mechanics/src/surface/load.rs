@@ -100,7 +100,7 @@ mod tests {
 
     /// Tables: 5·q·l⁴/(384·E·I), t·q·l²/(16·E·I), half.
     #[test]
-    fn a_load_all_over_a_beam_bends_it_as_tables_say() {
+    fn uniform_load_over_a_beam_bends_it_as_tabulated() {
         let (beam, l) = (beam(), 0.4);
         let load = UniformLoad::along(0.0, l, 1.0);
         let read = |kind, at| load.mean(&*beam.influence_function(kind, Position::along(at)));
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn moving_a_load_changes_what_is_read_as_its_gradient_says() {
+    fn moving_a_load_changes_readings_by_the_gradient() {
         let beam = beam();
         let load = |x_m: f64| UniformLoad::along(x_m - 0.01, x_m + 0.01, 1.0);
         let influence = beam.influence_function(SensorKind::Deflection, Position::along(0.13));

@@ -200,18 +200,18 @@ impl ResponseFunction for Proportional<'_> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InsensitiveSensor {
     /// A beam's support fixes the measured quantity.
-    #[error("{} there", held(*kind))]
+    #[error("{} there", constraint_name(*kind))]
     Held {
         /// Measured quantity.
         kind: SensorKind,
     },
     /// A plate's edge fixes the measured quantity.
-    #[error("the {edge} edge, which is {held}, has no {kind} for any contact")]
+    #[error("the {edge} edge, which is {constraint}, has no {kind} for any contact")]
     AtEdge {
         /// Name of the edge.
         edge: &'static str,
         /// Edge condition.
-        held: &'static str,
+        constraint: &'static str,
         /// Measured quantity.
         kind: SensorKind,
     },
@@ -223,7 +223,7 @@ pub enum InsensitiveSensor {
     },
 }
 
-fn held(kind: SensorKind) -> &'static str {
+fn constraint_name(kind: SensorKind) -> &'static str {
     match kind {
         SensorKind::Deflection => "a support fixes the surface",
         SensorKind::Slope => "a support fixes the slope",

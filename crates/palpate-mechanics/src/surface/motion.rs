@@ -94,7 +94,7 @@ impl Motion {
         let cycle_s = self.pass_s() + self.rest_s();
         let pass = ((time_s / cycle_s).floor() as usize).min(self.passes - 1);
         let since_s = time_s - pass as f64 * cycle_s;
-        let way = self.way_m(since_s.min(self.pass_s())) / self.length_m();
+        let way = self.distance_travelled_m(since_s.min(self.pass_s())) / self.length_m();
         let share = if pass.is_multiple_of(2) { way } else { 1.0 - way };
         Contact {
             position: Position {
@@ -154,7 +154,7 @@ impl Motion {
         if self.lifted_s > 0.0 { self.lifted_s + 2.0 * self.touch_s } else { 0.0 }
     }
 
-    fn way_m(&self, since_s: f64) -> f64 {
+    fn distance_travelled_m(&self, since_s: f64) -> f64 {
         let (turn_s, left_s) = (self.turn_s(), self.pass_s() - since_s);
         let turning = |t: f64| 0.5 * self.speed_m_per_s * (t - turn_s / PI * (PI * t / turn_s).sin());
         if since_s < turn_s {

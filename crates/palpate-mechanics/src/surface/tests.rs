@@ -152,7 +152,7 @@ fn a_beam_is_checked_when_it_is_read() {
 }
 
 #[test]
-fn the_extent_includes_its_boundary_and_nothing_beyond() {
+fn extent_includes_only_its_interior_and_boundary() {
     let line = PAPER.extent();
     assert!(line.contains(Position::along(0.0)) && line.contains(Position::along(0.4)));
     assert!(!line.contains(Position::along(0.401)) && !line.contains(Position { x_m: 0.2, y_m: 0.001 }));

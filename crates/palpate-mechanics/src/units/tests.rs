@@ -36,7 +36,7 @@ fn quantities_are_read_as_people_write_them() {
 }
 
 #[test]
-fn what_is_not_a_quantity_is_refused_with_the_units_that_would_do() {
+fn invalid_quantity_is_refused_with_valid_units() {
     let wanted = [
         ("", Dimension::Length),
         ("mm", Dimension::Length),
@@ -115,7 +115,7 @@ proptest! {
     }
 
     #[test]
-    fn what_is_shown_is_read_back(value in 1e-8..1e8f64) {
+    fn formatted_quantity_parses_to_its_value(value in 1e-8..1e8f64) {
         for dimension in [Dimension::Length, Dimension::Force, Dimension::Angle, Dimension::Strain, Dimension::Ratio] {
             let shown = Quantity { value, dimension }.to_string();
             let read: Quantity = shown.parse().unwrap();

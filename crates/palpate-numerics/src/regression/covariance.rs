@@ -41,7 +41,13 @@ impl Points {
     }
 
     pub fn of_groups(groups: &Groups, length_scales: &[f64], trend: Trend) -> Self {
-        Self::new(&groups.coordinates.view(), &groups.centre, &groups.spread, length_scales, trend)
+        Self::new(
+            &groups.coordinates.view(),
+            &groups.centre,
+            &groups.standard_deviations,
+            length_scales,
+            trend,
+        )
     }
 
     /// C; dC/d(r²) into `slopes`.

@@ -27,7 +27,7 @@ pub(super) struct Groups {
     /// Mean of each coordinate.
     pub centre: Vec<f64>,
     /// Standard deviation, or 1.
-    pub spread: Vec<f64>,
+    pub standard_deviations: Vec<f64>,
     /// ȳ, n×m, standardized.
     pub means: Array2<f64>,
     pub scatter: Array2<f64>,
@@ -93,7 +93,7 @@ impl Groups {
         Self {
             coordinates: self.coordinates.select(Axis(1), chosen),
             centre: self.centre.clone(),
-            spread: self.spread.clone(),
+            standard_deviations: self.standard_deviations.clone(),
             means: self.means.select(Axis(0), chosen),
             scatter: self.scatter.select(Axis(0), chosen),
             precision: chosen.iter().map(|i| self.precision[*i]).collect(),
@@ -114,7 +114,7 @@ fn collapse(coordinates: &ArrayView2<f64>, outputs: &Array2<f64>, relative: &[f6
     let mut groups = Groups {
         coordinates: points,
         centre,
-        spread: variance.iter().map(|v| if *v > 0.0 { v.sqrt() } else { 1.0 }).collect(),
+        standard_deviations: variance.iter().map(|v| if *v > 0.0 { v.sqrt() } else { 1.0 }).collect(),
         means: Array2::zeros((count, outputs.ncols())),
         scatter: Array2::zeros((count, outputs.ncols())),
         precision: members.iter().map(|rows| rows.iter().map(|r| 1.0 / relative[*r]).sum()).collect(),

@@ -118,7 +118,7 @@ mod tests {
     const STOP: Stop = Stop { evaluations: 300, decrease: 1e-14 };
 
     #[test]
-    fn the_bottom_of_rosenbrocks_valley_is_found() {
+    fn minimum_of_rosenbrocks_function_is_found() {
         let rosenbrock = |x: &[f64], g: &mut [f64]| {
             let (a, b) = (1.0 - x[0], x[1] - x[0] * x[0]);
             (g[0], g[1]) = (-2.0 * a - 400.0 * x[0] * b, 200.0 * b);
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn it_stops_when_told() {
+    fn minimiser_stops_on_request() {
         let mut left = 3;
         let slope = |_: &[f64], g: &mut [f64]| {
             g[0] = 1.0;

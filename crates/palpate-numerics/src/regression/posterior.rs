@@ -153,7 +153,7 @@ impl GaussianProcess {
                 (&learnt.weights, &learnt.trend),
             )
         };
-        let points = Points::new(&inputs.view(), &groups.centre, &groups.spread, scales, trend);
+        let points = Points::new(&inputs.view(), &groups.centre, &groups.standard_deviations, scales, trend);
         let reduced = Reduced::new(kernel, &points.scaled.view(), (0..first).collect(), &learnt.variance)?;
         let process = Self::assemble(data, points, Variance::Reduced(reduced));
         Ok(Self { covariance: Some(learnt.covariance), ..process })
@@ -183,11 +183,11 @@ impl GaussianProcess {
 
     /// Number of distinct points in the samples.
     pub fn points(&self) -> usize {
-        self.data.sparse.as_ref().map_or(self.kept(), |sparse| sparse.points)
+        self.data.sparse.as_ref().map_or(self.point_count(), |sparse| sparse.points)
     }
 
     /// Points that represent the mean, n.
-    pub fn kept(&self) -> usize {
+    pub fn point_count(&self) -> usize {
         self.points.scaled.ncols()
     }
 
@@ -213,7 +213,7 @@ impl GaussianProcess {
 
     /// Creates buffers.
     pub fn scratch(&self) -> PredictionScratch {
-        let n = self.kept();
+        let n = self.point_count();
         let reduced = match &self.variance {
             Variance::Exact { .. } => ReducedScratch::default(),
             Variance::Reduced(reduced) => reduced.scratch(),
@@ -253,7 +253,7 @@ impl GaussianProcess {
         assert_eq!(gradients.len(), self.outputs() * d, "a gradient is as long as outputs times coordinates");
         self.place(point, scratch);
         self.means(means, scratch);
-        let n = self.kept();
+        let n = self.point_count();
         let PredictionScratch { point, slopes, product, outputs, .. } = scratch;
         let product = &mut product.as_flattened_mut()[..n];
         squared_distances_into(product, &self.points.scaled.view(), |k| point[k]);
@@ -272,7 +272,7 @@ impl GaussianProcess {
             for (j, sum) in outputs.iter().enumerate() {
                 let slope = match self.data.trend {
                     Trend::Constant => 0.0,
-                    Trend::Linear => self.trend[[j, 1 + k]] / self.data.spread[k],
+                    Trend::Linear => self.trend[[j, 1 + k]] / self.data.standard_deviations[k],
                 };
                 gradients[j * d + k] = self.data.scale[j] * (sum + slope);
             }
@@ -300,14 +300,14 @@ impl GaussianProcess {
 
     /// Var f_j(x)/s_j².
     fn relative_variance(&self, scratch: &mut PredictionScratch) -> f64 {
-        let correlations = &scratch.correlations.as_flattened()[..self.kept()];
+        let correlations = &scratch.correlations.as_flattened()[..self.point_count()];
         match &self.variance {
             Variance::Reduced(reduced) => {
                 reduced.variance(correlations, &scratch.basis, &mut scratch.reduced)
             }
             Variance::Exact { whiten, basis, trend } => {
                 let explained = whiten.product_into(correlations, &mut scratch.product);
-                let half = ArrayView1::from(&scratch.product.as_flattened()[..self.kept()]);
+                let half = ArrayView1::from(&scratch.product.as_flattened()[..self.point_count()]);
                 let mut rest = ArrayViewMut1::from(&mut scratch.basis[..]);
                 general_mat_vec_mul(-1.0, &basis.t(), &half, 1.0, &mut rest);
                 trend.solve_lower_in_place(&mut scratch.basis);
@@ -324,7 +324,7 @@ impl GaussianProcess {
     pub fn tabulate_into(&self, point: &[f64], means: &mut [f64], scratch: &mut PredictionScratch) -> f64 {
         self.mean_into(point, means, scratch);
         let variance = self.relative_variance(scratch);
-        let correlations = &scratch.correlations.as_flattened()[..self.kept()];
+        let correlations = &scratch.correlations.as_flattened()[..self.point_count()];
         let by_nearest = match (&self.variance, &self.data.sparse, &self.covariance) {
             (Variance::Reduced(_), None, _) => self.variance_by_nearest(correlations, &scratch.basis),
             (Variance::Reduced(_), Some(_), Some(covariance)) => {
@@ -375,7 +375,7 @@ impl GaussianProcess {
         let half = factor.solve_lower(&here);
         let open = (1.0 - half.dot(&half)).max(0.0);
         let weights: Vec<f64> = factor.solve_upper(&half).iter().chain(h).copied().collect();
-        let trend = self.kept()..self.kept() + h.len();
+        let trend = self.point_count()..self.point_count() + h.len();
         let entries: Vec<usize> = nearest.into_iter().chain(trend).collect();
         let told: f64 = entries
             .iter()
@@ -399,7 +399,7 @@ impl GaussianProcess {
 
     fn place(&self, point: &[f64], scratch: &mut PredictionScratch) {
         assert_eq!(point.len(), self.coordinates(), "a point has as many coordinates as a row");
-        let PosteriorData { centre, spread, hyperparameters, .. } = &self.data;
+        let PosteriorData { centre, standard_deviations: spread, hyperparameters, .. } = &self.data;
         for (k, x) in point.iter().enumerate() {
             scratch.point[k] = (x - centre[k]) / hyperparameters.length_scales[k];
         }
@@ -434,7 +434,13 @@ impl TryFrom<PosteriorData> for GaussianProcess {
         let coordinates =
             Array2::from_shape_vec((n, d), data.inputs.clone()).unwrap_or_default().reversed_axes();
         let Hyperparameters { length_scales, noise_ratio } = &data.hyperparameters;
-        let points = Points::new(&coordinates.view(), &data.centre, &data.spread, length_scales, data.trend);
+        let points = Points::new(
+            &coordinates.view(),
+            &data.centre,
+            &data.standard_deviations,
+            length_scales,
+            data.trend,
+        );
         let variance = match &data.sparse {
             None => Variance::of_points(&points, data.kernel, &data.noise, *noise_ratio, None)?,
             Some(sparse) => {
@@ -466,7 +472,8 @@ struct PosteriorData {
     /// Mean of each coordinate.
     pub centre: Vec<f64>,
     /// Standard deviation of each coordinate.
-    pub spread: Vec<f64>,
+    #[serde(rename = "spread")]
+    pub standard_deviations: Vec<f64>,
     pub hyperparameters: Hyperparameters,
     /// n×d.
     pub inputs: Vec<f64>,
@@ -542,7 +549,7 @@ impl PosteriorData {
             kernel,
             trend,
             centre: groups.centre.clone(),
-            spread: groups.spread.clone(),
+            standard_deviations: groups.standard_deviations.clone(),
             hyperparameters: hyperparameters.clone(),
             inputs,
             noise: Vec::new(),
@@ -566,7 +573,7 @@ impl PosteriorData {
         some("coordinates", d)?;
         some("outputs", m)?;
         let lists: [(&'static str, usize, &[f64]); 6] = [
-            ("spreads", d, &self.spread),
+            ("spreads", d, &self.standard_deviations),
             ("length scales", d, &self.hyperparameters.length_scales),
             ("inputs", n.saturating_mul(d), &self.inputs),
             ("scales", m, &self.scale),
@@ -589,8 +596,12 @@ impl PosteriorData {
         for (what, list) in names.into_iter().zip(finite) {
             numbers(what, list, |_| true, "finite")?;
         }
-        let positive =
-            [&self.spread, &self.hyperparameters.length_scales, &self.scale, &self.signal_variance];
+        let positive = [
+            &self.standard_deviations,
+            &self.hyperparameters.length_scales,
+            &self.scale,
+            &self.signal_variance,
+        ];
         for (what, list) in ["spread", "length scale", "scale", "signal variance"].into_iter().zip(positive) {
             numbers(what, list, |value| value > 0.0, "finite and greater than 0")?;
         }

@@ -128,7 +128,7 @@ pub(super) struct Rows<'a> {
     pub noise: &'a [f64],
 }
 
-pub(super) struct Learnt {
+pub(super) struct ReducedPosterior {
     /// α, k×m; β, q×m.
     pub weights: Array2<f64>,
     pub trend: Array2<f64>,
@@ -147,7 +147,7 @@ pub(super) fn learn(
     rows: Rows,
     chosen: &[usize],
     watch: Watch,
-) -> Result<Learnt, RegressionError> {
+) -> Result<ReducedPosterior, RegressionError> {
     let (n, terms, outputs) = (rows.scaled.ncols(), rows.basis.ncols(), rows.means.ncols());
     let points = rows.scaled.select(Axis(1), chosen);
     let whiten = factor_of(kernel, &points.view())?;
@@ -191,7 +191,7 @@ pub(super) fn learn(
     let mut values = factor.inverse_lower();
     let at_points = values.slice(s![.., ..all]).dot(&whiten.lower().t());
     values.slice_mut(s![.., ..all]).assign(&at_points);
-    Ok(Learnt {
+    Ok(ReducedPosterior {
         weights,
         trend,
         quadratics: square

@@ -98,19 +98,19 @@ impl Regression {
         };
         let search = groups.len().min(self.search_points.max(2));
         let trial = first(search.min(TRIAL_POINTS));
-        let mut best = self.follow(&trial, &prior, &prior.start(STARTS[0]), TRIAL, watch)?;
+        let mut best = self.maximize_from(&trial, &prior, &prior.start(STARTS[0]), TRIAL, watch)?;
         for start in &STARTS[1..] {
-            let found = self.follow(&trial, &prior, &prior.start(*start), TRIAL, watch)?;
+            let found = self.maximize_from(&trial, &prior, &prior.start(*start), TRIAL, watch)?;
             if found.1 < best.1 {
                 best = found;
             }
         }
-        let best = self.follow(&first(search), &prior, &best.0, FINAL, watch)?;
+        let best = self.maximize_from(&first(search), &prior, &best.0, FINAL, watch)?;
         Ok(Hyperparameters::from_logarithms(&best.0))
     }
 
     /// Optimum, and minus its log density.
-    fn follow(
+    fn maximize_from(
         &self,
         groups: &Groups,
         prior: &Prior,
@@ -143,10 +143,10 @@ struct Prior {
 
 impl Prior {
     fn new(groups: &Groups) -> Self {
-        let d = groups.spread.len();
+        let d = groups.standard_deviations.len();
         // The distance of points in d dimensions is about √d spreads.
         let apart = (d as f64).sqrt();
-        let scales = groups.spread.iter().map(|spread| (spread * apart).ln());
+        let scales = groups.standard_deviations.iter().map(|spread| (spread * apart).ln());
         let known_start = groups.noise_given.then(|| -groups.mean_square().max(f64::MIN_POSITIVE).ln());
         let (noise, deviation) = known_start.map_or((1e-3_f64.ln(), 5.0), |start| (start, 3.0));
         let centre = scales.chain([noise]).collect();

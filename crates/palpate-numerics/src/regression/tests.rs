@@ -58,7 +58,7 @@ fn dense(process: &GaussianProcess, regression: Regression, samples: Samples, at
         let mut trend = 1.0;
         for k in 0..d {
             r2 += ((a[k] - b[k]) / h.length_scales[k]).powi(2);
-            let z = |v: f64| (v - distinct.centre[k]) / distinct.spread[k];
+            let z = |v: f64| (v - distinct.centre[k]) / distinct.standard_deviations[k];
             if regression.trend == Trend::Linear {
                 trend += z(a[k]) * z(b[k]);
             }
@@ -195,7 +195,7 @@ fn without_noise_it_interpolates() {
 }
 
 #[test]
-fn far_away_it_knows_what_it_knew_before() {
+fn posterior_far_away_equals_the_prior() {
     let (x, y) = noisy(30, 1, 0.1, 5);
     let process = fit(Regression::default(), samples(&x, &y, None));
     let (mean, variance) = process.predict(&[1e4, -1e4]);
@@ -241,7 +241,7 @@ fn a_sampled_functions_hyperparameters_are_recovered() {
 }
 
 #[test]
-fn repeats_alone_tell_the_noise() {
+fn repeats_alone_determine_the_noise() {
     // Eight places, too few to distinguish the function from noise without repeats.
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
     let x = Array2::from_shape_fn((160, 1), |(r, _)| (r % 8) as f64);
@@ -365,7 +365,7 @@ fn difference(exact: &GaussianProcess, other: &GaussianProcess, at: &Array2<f64>
 }
 
 #[test]
-fn chosen_points_tell_what_all_do() {
+fn chosen_points_predict_like_all_points() {
     for (samples_of, trend) in [
         (features as fn(usize, u64) -> (Array2<f64>, Array2<f64>), Trend::Constant),
         (|rows, seed| noisy(rows, 1, 0.2, seed), Trend::Linear),
@@ -387,8 +387,13 @@ fn chosen_points_tell_what_all_do() {
         for at in at.outer_iter() {
             let standard = |k: usize, by: &[f64]| (at[k] - groups.centre[k]) / by[k];
             let d = scales.len();
-            let here =
-                Points::new(&at.insert_axis(Axis(1)).view(), &groups.centre, &groups.spread, scales, trend);
+            let here = Points::new(
+                &at.insert_axis(Axis(1)).view(),
+                &groups.centre,
+                &groups.standard_deviations,
+                scales,
+                trend,
+            );
             let correlations: Vec<f64> = (0..groups.len())
                 .map(|i| {
                     let r2 = (0..d).map(|k| (standard(k, scales) - points.scaled[[k, i]]).powi(2)).sum();
@@ -406,7 +411,7 @@ fn chosen_points_tell_what_all_do() {
         assert!(mean < 0.05 && sd < 0.02, "{trend:?}: {mean} {sd}");
         let evidence = sparse.log_evidence() - process.log_evidence();
         assert!(evidence.abs() < 0.01 * process.log_evidence().abs(), "{trend:?}: {evidence}");
-        assert_eq!((sparse.points(), sparse.kept() < 900), (900, true));
+        assert_eq!((sparse.points(), sparse.point_count() < 900), (900, true));
         let text = serde_json::to_string(&sparse).unwrap();
         let back: GaussianProcess = serde_json::from_str(&text).unwrap();
         let [mean, sd] = difference(&sparse, &back, &at);
@@ -435,7 +440,13 @@ fn tables_of_a_rough_process_are_as_sure_as_all_rows_make_them() {
     for _ in 0..100 {
         let at: Vec<f64> = (0..2).map(|_| rng.random_range(0.0..1.0)).collect();
         let here = Array2::from_shape_vec((2, 1), at.clone()).unwrap();
-        let here = Points::new(&here.view(), &groups.centre, &groups.spread, &found.length_scales, trend);
+        let here = Points::new(
+            &here.view(),
+            &groups.centre,
+            &groups.standard_deviations,
+            &found.length_scales,
+            trend,
+        );
         let squares = |i: usize| (0..2).map(|k| (here.scaled[[k, 0]] - points.scaled[[k, i]]).powi(2)).sum();
         let correlations: Array1<f64> = (0..2500).map(|i| kernel.correlation(squares(i))).collect();
         let half = covariance.factor.solve_lower(&correlations);

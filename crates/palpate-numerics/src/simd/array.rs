@@ -1,6 +1,6 @@
 //! Portable vectors, and reference of the vectors made of instructions.
 
-use super::{Arithmetic, Eight, Number, Real, Vector};
+use super::{Arithmetic, EightLanes, Number, Real, Vector};
 use std::ops::{Add, Div, Mul, Sub};
 
 /// N numbers. With `FUSED` a multiply-add rounds once.
@@ -101,7 +101,7 @@ impl<const FUSED: bool> Number for Array<f64, 8, FUSED> {
     }
 }
 
-impl<const FUSED: bool> Eight for Array<f64, 8, FUSED> {
+impl<const FUSED: bool> EightLanes for Array<f64, 8, FUSED> {
     #[inline(always)]
     fn below(self, other: Self) -> u8 {
         (0..8).fold(0, |bits, l| bits | u8::from(self.0[l] < other.0[l]) << l)

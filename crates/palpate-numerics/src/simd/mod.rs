@@ -32,7 +32,7 @@ mod vector;
 mod x86;
 
 pub use array::Array;
-pub use vector::{Abreast, Arithmetic, Eight, LOOK_UP, Number, Real, Vector};
+pub use vector::{Arithmetic, EightLanes, LOOK_UP, Number, Real, RowLanes, Vector};
 
 /// Work that is written once for every instruction set.
 pub trait Kernel {
@@ -47,7 +47,7 @@ pub trait Kernel {
 /// The vectors of an instruction set.
 pub trait Simd {
     /// Eight f64.
-    type F64: Eight;
+    type F64: EightLanes;
     /// Sixteen f32.
     type F32: Vector<16, Real = f32>;
     /// N numbers.

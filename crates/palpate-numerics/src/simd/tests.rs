@@ -38,7 +38,7 @@ fn vector_operations<V: Vector<N>, const N: usize>(shift: usize) -> Vec<[V::Real
 }
 
 #[inline(always)]
-fn eight_operations<V: Eight>(shift: usize) -> (Vec<[f64; 8]>, Vec<u8>, f64) {
+fn eight_operations<V: EightLanes>(shift: usize) -> (Vec<[f64; 8]>, Vec<u8>, f64) {
     let [a, b] = [shift, shift + 1].map(|shift| V::load(&numbers(shift)));
     let nan = V::splat(f64::NAN);
     let eight = std::array::from_fn(|i| V::load(&numbers(shift + i)));
@@ -46,8 +46,8 @@ fn eight_operations<V: Eight>(shift: usize) -> (Vec<[f64; 8]>, Vec<u8>, f64) {
         a.truncate(),
         a.or((shift * 37) as u8, b),
         V::sums(&eight),
-        a.where_below(b, eight[2], eight[3]),
-        nan.where_below(b, a, b),
+        a.select_below(b, eight[2], eight[3]),
+        nan.select_below(b, a, b),
     ]
     .map(V::to_array);
     assert_eq!(vectors[2], eight.map(V::sum));
@@ -111,7 +111,7 @@ fn a_lane_computes_as_a_number_does() {
             assert_eq!(x.at_most(y) >> lane & 1, a[lane].at_most(b[lane]));
             assert_eq!(x.below(y) >> lane & 1 == 1, a[lane] < b[lane]);
         }
-        assert_lanes(x.where_below(y, z, x).to_array(), |l| if a[l] < b[l] { c[l] } else { a[l] });
+        assert_lanes(x.select_below(y, z, x).to_array(), |l| if a[l] < b[l] { c[l] } else { a[l] });
         let nan = Array::<f64, 8, true>::splat(f64::NAN);
         assert_eq!((nan.max(x).to_array(), nan.min(x).to_array()), (a, a));
     }

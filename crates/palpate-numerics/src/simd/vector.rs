@@ -170,13 +170,13 @@ pub trait Vector<const N: usize>: Arithmetic {
 }
 
 /// Eight f64.
-pub trait Eight: Number + Vector<8> {
+pub trait EightLanes: Number + Vector<8> {
     /// Bit i: lane i is below that of `other`.
     fn below(self, other: Self) -> u8;
 
     /// `value` where `self` is below `bound`, otherwise `other`.
     #[inline(always)]
-    fn where_below(self, bound: Self, value: Self, other: Self) -> Self {
+    fn select_below(self, bound: Self, value: Self, other: Self) -> Self {
         value.or(self.below(bound), other)
     }
 
@@ -187,7 +187,7 @@ pub trait Eight: Number + Vector<8> {
         ((a[0] + a[4]) + (a[2] + a[6])) + ((a[1] + a[5]) + (a[3] + a[7]))
     }
 
-    /// [`Eight::sum`] of each of eight vectors.
+    /// [`EightLanes::sum`] of each of eight vectors.
     #[inline(always)]
     fn sums(eight: &[Self; 8]) -> Self {
         let mut sums = [0.0; 8];
@@ -230,7 +230,7 @@ impl Number for f64 {
 }
 
 /// One number per row, for one row or eight with equal bits; `V` is a row's vector.
-pub trait Abreast<V: Copy>: Number {
+pub trait RowLanes<V: Copy>: Number {
     /// Number of rows.
     const COUNT: usize;
     /// Bits of all rows.
@@ -244,11 +244,11 @@ pub trait Abreast<V: Copy>: Number {
     fn lanes(self) -> Self::Each<f64>;
     /// Creates lanes from numbers.
     fn from_lanes(lanes: &Self::Each<f64>) -> Self;
-    /// [`Eight::sum`] of each row's K vectors.
+    /// [`EightLanes::sum`] of each row's K vectors.
     fn sums<const K: usize>(vectors: &Self::Each<[V; K]>) -> [Self; K];
 }
 
-impl<V: Eight> Abreast<V> for f64 {
+impl<V: EightLanes> RowLanes<V> for f64 {
     const COUNT: usize = 1;
     type Each<T: Copy> = [T; 1];
 
@@ -274,7 +274,7 @@ impl<V: Eight> Abreast<V> for f64 {
     }
 }
 
-impl<V: Eight> Abreast<V> for V {
+impl<V: EightLanes> RowLanes<V> for V {
     const COUNT: usize = 8;
     type Each<T: Copy> = [T; 8];
 

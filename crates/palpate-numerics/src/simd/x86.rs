@@ -8,7 +8,7 @@
     reason = "the registers of a macro have the types of its callers"
 )]
 
-use super::{Arithmetic, Eight, LOOK_UP, Number, Vector};
+use super::{Arithmetic, EightLanes, LOOK_UP, Number, Vector};
 use std::arch::x86_64::*;
 use std::mem::transmute;
 use std::ops::{Add, Div, Mul, Sub};
@@ -212,7 +212,7 @@ impl Number for Avx512F64 {
     }
 }
 
-impl Eight for Avx512F64 {
+impl EightLanes for Avx512F64 {
     #[inline(always)]
     fn below(self, other: Self) -> u8 {
         // SAFETY: see the head of this file.
@@ -288,14 +288,14 @@ impl Number for Avx2F64 {
     }
 }
 
-impl Eight for Avx2F64 {
+impl EightLanes for Avx2F64 {
     #[inline(always)]
     fn below(self, other: Self) -> u8 {
         each_register!(self, r => _mm256_cmp_pd::<_CMP_LT_OQ>(self.0[r], other.0[r])).signs()
     }
     // Without the conversion to bits and back, which would take as long as eight additions.
     #[inline(always)]
-    fn where_below(self, bound: Self, value: Self, other: Self) -> Self {
+    fn select_below(self, bound: Self, value: Self, other: Self) -> Self {
         each_register!(self, r => {
             _mm256_blendv_pd(other.0[r], value.0[r], _mm256_cmp_pd::<_CMP_LT_OQ>(self.0[r], bound.0[r]))
         })

@@ -181,10 +181,10 @@ pub(crate) struct Tick {
 /// single tick.
 pub(crate) fn choose_ticks(
     axis: &AxisScale,
-    asked: Option<&[(f64, String)]>,
+    ticks: Option<&[(f64, String)]>,
     fits: &dyn Fn(&[Tick]) -> bool,
 ) -> Vec<Tick> {
-    match (asked, axis.scale) {
+    match (ticks, axis.scale) {
         (Some(asked), _) => chosen(axis, asked, fits),
         (None, Scale::Linear) => linear(axis, fits),
         (None, Scale::Log10) => logarithmic(axis, fits),

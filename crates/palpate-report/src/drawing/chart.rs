@@ -250,7 +250,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_number_does_not_count() {
+    fn extremes_ignore_nan_and_infinity() {
         let extremes = Extremes::from_values([3.0, f64::NAN, 0.3, f64::INFINITY]);
         assert_eq!(extremes, Extremes { least: 0.3, greatest: 3.0 });
         assert!(extremes.are_far_apart());

@@ -3,7 +3,7 @@
 use super::axis::minor_ticks;
 use super::chart::{BandPoint, Chart, ErrorPoint, Mark, Marker, Series, SeriesKind, Stroke};
 use super::geometry::{Point, Rect};
-use super::layout::{Layout, Named};
+use super::layout::{Layout, LegendItem};
 use super::svg::{BLACK, Colour, GRID, MINOR_GRID, QUIET_INK, REFERENCE, Svg, WHITE, palette};
 
 const LINE_WIDTH: f64 = 1.8;
@@ -182,8 +182,8 @@ impl Painter<'_> {
             let Rect { left, right, top, bottom } = entry.swatch;
             let middle = top.midpoint(bottom);
             match entry.named {
-                Named::Series(series) => self.swatch(series, entry.swatch),
-                Named::Reference => {
+                LegendItem::Series(series) => self.swatch(series, entry.swatch),
+                LegendItem::Reference => {
                     self.svg.dashed_line(&[(left, middle), (right, middle)], REFERENCE_WIDTH, REFERENCE);
                 }
             }

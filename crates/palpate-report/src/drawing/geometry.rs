@@ -21,7 +21,7 @@ impl Rect {
         self.bottom - self.top
     }
 
-    pub fn moved(&self, right: f64, down: f64) -> Rect {
+    pub fn translate(&self, right: f64, down: f64) -> Rect {
         Rect {
             left: self.left + right,
             right: self.right + right,

@@ -75,7 +75,7 @@ impl<'a> Layout<'a> {
         labels.extend(x_axis_label(chart, &plot, width));
         let legend_left = left.min(width - MARGIN - legend.width).max(MARGIN);
         let legend_top = height - MARGIN - legend.height;
-        let legend = legend.moved(legend_left, legend_top);
+        let legend = legend.translate(legend_left, legend_top);
         Layout { width_px, height_px, plot, x, y, x_ticks, y_ticks, labels, legend }
     }
 
@@ -233,14 +233,14 @@ const INDENT: f64 = 31.0;
 const GAP: f64 = 18.0;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Named<'a> {
+pub(crate) enum LegendItem<'a> {
     Series(&'a Series),
     Reference,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Entry<'a> {
-    pub named: Named<'a>,
+    pub named: LegendItem<'a>,
     /// Box of the sample.
     pub swatch: Rect,
     pub label: Label,
@@ -258,7 +258,7 @@ pub(crate) struct Legend<'a> {
 
 impl<'a> Legend<'a> {
     pub fn new(chart: &'a Chart, width: f64, most_rows: usize) -> Self {
-        let names: Vec<(Named<'_>, String)> =
+        let names: Vec<(LegendItem<'_>, String)> =
             names(chart).map(|(named, name)| (named, text::fit(name, NAME_SIZE, width - INDENT))).collect();
         let mut kept = names.len();
         let mut places = arrange(&names, kept, width);
@@ -281,10 +281,10 @@ impl<'a> Legend<'a> {
         }
     }
 
-    pub fn moved(mut self, left: f64, top: f64) -> Self {
+    pub fn translate(mut self, left: f64, top: f64) -> Self {
         for entry in &mut self.entries {
-            entry.swatch = entry.swatch.moved(left, top);
-            entry.area = entry.area.moved(left, top);
+            entry.swatch = entry.swatch.translate(left, top);
+            entry.area = entry.area.translate(left, top);
         }
         for label in self.entries.iter_mut().map(|entry| &mut entry.label).chain(&mut self.remainder) {
             label.at = (label.at.0 + left, label.at.1 + top);
@@ -299,7 +299,7 @@ struct Place {
     width: f64,
 }
 
-fn arrange(names: &[(Named<'_>, String)], kept: usize, width: f64) -> Vec<Place> {
+fn arrange(names: &[(LegendItem<'_>, String)], kept: usize, width: f64) -> Vec<Place> {
     let mut widths: Vec<f64> =
         names[..kept].iter().map(|(_, name)| INDENT + text::width(name, NAME_SIZE)).collect();
     if kept < names.len() {
@@ -317,10 +317,10 @@ fn arrange(names: &[(Named<'_>, String)], kept: usize, width: f64) -> Vec<Place>
     places
 }
 
-fn names(chart: &Chart) -> impl Iterator<Item = (Named<'_>, &str)> {
-    let series = chart.series.iter().map(|series| (Named::Series(series), series.label.as_str()));
+fn names(chart: &Chart) -> impl Iterator<Item = (LegendItem<'_>, &str)> {
+    let series = chart.series.iter().map(|series| (LegendItem::Series(series), series.label.as_str()));
     let references = chart.marks.iter().filter_map(|mark| match mark {
-        Mark::HorizontalLine { label, .. } => Some((Named::Reference, label.as_str())),
+        Mark::HorizontalLine { label, .. } => Some((LegendItem::Reference, label.as_str())),
         Mark::VerticalLine { .. } | Mark::Span { .. } => None,
     });
     series.chain(references).filter(|(_, name)| !name.trim().is_empty())
@@ -335,7 +335,7 @@ fn label(text: String, left: f64, row: usize) -> Label {
     Label { text, at: (left, middle), anchor: Anchor::Start, size: NAME_SIZE, colour: INK }
 }
 
-fn entry<'a>(named: Named<'a>, name: &str, place: &Place) -> Entry<'a> {
+fn entry<'a>(named: LegendItem<'a>, name: &str, place: &Place) -> Entry<'a> {
     let top = place.row as f64 * ROW_HEIGHT;
     let left = place.left;
     Entry {

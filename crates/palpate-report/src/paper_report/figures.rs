@@ -5,7 +5,7 @@ use maud::html;
 use super::Paper;
 use crate::error_lines::{banded, limit_in_words};
 use crate::page::Figure;
-use crate::study_report::{ArmLine, error_chart, spread_by_position};
+use crate::study_report::{ArmLine, error_chart, quantiles_by_position};
 use crate::{Axis, Chart, ErrorPoint, Marker, Series, SeriesKind};
 use palpate_estimators::evaluation::Quantiles;
 use palpate_studies::ArmResults;
@@ -44,7 +44,7 @@ impl Paper<'_> {
     pub(super) fn predicted_against_actual(&self) -> Option<Figure> {
         let outcome = self.report.outcome("position-10")?;
         let length_mm = self.report.length_m() * 1e3;
-        let predicted = spread_by_position(outcome, |located| located.estimate.x_m * 1e3);
+        let predicted = quantiles_by_position(outcome, |located| located.estimate.x_m * 1e3);
         let ends = vec![(0.0, 0.0), (length_mm, length_mm)];
         let mut series = vec![Series::dashes("predicted = actual", 6, ends)];
         series.extend(banded("predicted, median of the seeds", 1, &predicted, outcome.fits.len() > 1));
@@ -145,7 +145,7 @@ impl Paper<'_> {
         let middle = (families.len() - 1) as f64 / 2.0;
         let families: Vec<(Family, f64)> =
             families.iter().enumerate().map(|(i, family)| (*family, (i as f64 - middle) * PITCH)).collect();
-        let ours = families.iter().flat_map(|(family, shift)| self.found(measure, *family, *shift));
+        let ours = families.iter().flat_map(|(family, shift)| self.measured_series(measure, *family, *shift));
         let theirs = families.iter().filter_map(|(family, shift)| self.printed(measure, *family, *shift));
         let mut series: Vec<Series> = ours.chain(theirs).collect();
         let crosses = |series: &&mut Series| matches!(series.kind, SeriesKind::Points { .. });
@@ -157,7 +157,7 @@ impl Paper<'_> {
         (!series.is_empty()).then(|| Chart::new(measure.title, x, measure.axis.clone(), series))
     }
 
-    fn found(&self, measure: &Measure, family: Family, shift: f64) -> Vec<Series> {
+    fn measured_series(&self, measure: &Measure, family: Family, shift: f64) -> Vec<Series> {
         let points: Vec<ErrorPoint> = COUNTS
             .iter()
             .filter_map(|&count| {

@@ -7,7 +7,7 @@ use maud::{Markup, html};
 
 use super::StudyReport;
 use super::bench_figures::bench_figure;
-use super::numbers::{counted, listed, mm, number, stated};
+use super::numbers::{counted, listed, mm, number, rig_number};
 use super::page::{Page, ReportFile, Section};
 use super::study_report::{arms_table, glossary, least_error, longest, run_table, source};
 use palpate_mechanics::sensing::SensorKind;
@@ -25,10 +25,10 @@ pub fn paper_report(report: &StudyReport) -> Vec<ReportFile> {
     let paper = Paper {
         report,
         published: published_figures(report.results),
-        claims: claims(report.outcomes, report.study.judging()),
+        claims: claims(report.outcomes, report.study.evaluation_settings()),
     };
     Page::new("A distributive tactile sensor, replicated", paper.summary(), paper.sections())
-        .with_lead(lead())
+        .with_lead(introduction())
         .with_source(source(report))
         .files()
 }
@@ -66,12 +66,14 @@ impl Paper<'_> {
                 .figure(self.errors_of_codings())
                 .figure(self.errors_of_arrangements()),
             Section::new("published", "Published against replicated")
-                .text(self.about_published())
+                .text(self.published_section())
                 .table(self.published_table()),
-            Section::new("claims", "The paper's claims").text(self.about_claims()).table(self.claims_table()),
+            Section::new("claims", "The paper's claims")
+                .text(self.claims_section())
+                .table(self.claims_table()),
             Section::new("not-replicated", "What does not replicate").text(self.not_replicated()),
             Section::new("open", "What the paper does not specify")
-                .text(self.about_open())
+                .text(self.discrepancies_section())
                 .table(self.open_table()),
             Section::new("arms", "All arms").table(arms_table(self.report)),
             Section::new("run", "The run").table(run_table(self.report)),
@@ -93,7 +95,7 @@ impl Paper<'_> {
 
     fn what_was_done(&self) -> Markup {
         let arms = self.report.results.arms.len();
-        let positions = self.report.study.judging().positions.len();
+        let positions = self.report.study.evaluation_settings().positions.len();
         html! {
             (counted(self.report.networks(), "network", "networks")) " trained: " (counted(arms, "arm", "arms"))
             " that differ in training positions or output coding, " (self.report.seeds_in_words())
@@ -183,7 +185,7 @@ impl Paper<'_> {
     }
 }
 
-fn lead() -> Markup {
+fn introduction() -> Markup {
     html! {
         p.lead {
             "A bent beam reveals where it is touched. This page repeats, in simulation, the study with which P. \
@@ -232,10 +234,10 @@ fn bench_in_words(rig: &Rig, beam: Beam, force_n: f64) -> Markup {
     html! {
         p {
             "The surface here is a beam, " (mm(beam.length_m())) " mm long, " (mm(beam.width_m())) " mm wide and "
-            (mm(beam.thickness_m())) " mm thick, with a Young's modulus of " (stated(beam.youngs_modulus_pa() / 1e9))
+            (mm(beam.thickness_m())) " mm thick, with a Young's modulus of " (rig_number(beam.youngs_modulus_pa() / 1e9))
             " GPa, on two wedges at its ends. "
             (counted(rig.setup.layout().len(), "sensor measures", "sensors measure")) " its " (kinds(rig)) " while a load of "
-            (stated(force_n)) " N, which is known, stands on it. With the load in the middle the beam sags by "
+            (rig_number(force_n)) " N, which is known, stands on it. With the load in the middle the beam sags by "
             (number(sag_mm)) " mm there."
         }
     }

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::Paper;
-use crate::numbers::{NOTHING, as_written, listed, mm, number, spread, stated, stretch, whole};
+use crate::numbers::{NOTHING, as_written, listed, mm, number, quantile_range, rig_number, stretch, whole};
 use crate::page::{Table, verdict};
 use palpate_estimators::arrangement::{Arrangement, Training};
 use palpate_estimators::estimator::Setting;
@@ -13,7 +13,7 @@ use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::Surface;
 use palpate_rig::Rig;
 use palpate_studies::PortionResults;
-use palpate_studies::paper::{Claim, ClaimPart, PublishedFigure, Yardstick};
+use palpate_studies::paper::{AgreementCriterion, Claim, ClaimPart, PublishedFigure};
 
 struct Set<'a> {
     arms: Vec<&'a str>,
@@ -80,7 +80,7 @@ impl Paper<'_> {
     pub(super) fn portions_table(&self) -> Table {
         let mut rows: Vec<(&str, Portion, String, Quantiles)> = Vec::new();
         if let Some(arm) = self.report.results.arm("position-10") {
-            let all = self.report.judged_portion();
+            let all = self.report.evaluated_portion();
             rows.extend(all.map(|all| ("average", all, "error_percent".to_owned(), arm.error_percent)));
             rows.extend(arm.portions.iter().map(|PortionResults { portion, error_percent, .. }| {
                 ("average", *portion, format!("error_percent_{}", portion.key()), *error_percent)
@@ -100,9 +100,9 @@ impl Paper<'_> {
             .short("error", |(kind, ..)| *kind)
             .numeric("published, %", |(_, _, key, _)| published(key).map_or(NOTHING.to_owned(), printed))
             .numeric("found, %", |(_, _, key, found)| {
-                spread(published(key).map_or(*found, |figure| figure.found), number)
+                quantile_range(published(key).map_or(*found, |figure| figure.result), number)
             })
-            .numeric("found, mm", |(.., found)| spread(found.scaled(mm_per_percent), number))
+            .numeric("found, mm", |(.., found)| quantile_range(found.scaled(mm_per_percent), number))
             .caption(caption)
     }
 }
@@ -176,7 +176,7 @@ fn run_of(positions: &[Position]) -> String {
 const MOST_SEEDS: f64 = 0.5;
 
 impl Paper<'_> {
-    pub(super) fn about_published(&self) -> Markup {
+    pub(super) fn published_section(&self) -> Markup {
         if self.published.is_empty() {
             return html! { p { "No arm with a published figure was run." } };
         }
@@ -197,16 +197,16 @@ impl Paper<'_> {
         };
         Table::from_rows(&self.published)
             .short("arm", |figure| figure.arm)
-            .short("figure", |figure| figure.what)
+            .short("figure", |figure| figure.label)
             .numeric("published", |figure| printed(figure))
-            .numeric("found", |figure| spread(figure.found, shown(figure)))
-            .short("agrees if within", |figure| yardstick(figure))
+            .numeric("found", |figure| quantile_range(figure.result, number_format(figure)))
+            .short("agrees if within", |figure| criterion_text(figure))
             .column("short", "verdict", |figure| verdict(figure.agrees, "agrees", "differs"))
             .column("short", "within 5–95 %", |figure| verdict(figure.within_seeds, "yes", "no"))
             .caption(caption)
     }
 
-    pub(super) fn about_claims(&self) -> Markup {
+    pub(super) fn claims_section(&self) -> Markup {
         html! {
             @if self.claims.is_empty() { p { "The arms that the paper's claims are about were not all run." } }
         }
@@ -264,23 +264,23 @@ impl Paper<'_> {
 
 /// Formats a value as in the paper; a bound with its sign.
 fn printed(figure: &PublishedFigure) -> String {
-    let sign = if figure.yardstick == Yardstick::Below { "< " } else { "" };
+    let sign = if figure.criterion == AgreementCriterion::Below { "< " } else { "" };
     format!("{sign}{}", as_written(figure.published))
 }
 
-fn shown(figure: &PublishedFigure) -> fn(f64) -> String {
-    if matches!(figure.yardstick, Yardstick::Factor(_)) { whole } else { number }
+fn number_format(figure: &PublishedFigure) -> fn(f64) -> String {
+    if matches!(figure.criterion, AgreementCriterion::Factor(_)) { whole } else { number }
 }
 
-fn yardstick(figure: &PublishedFigure) -> String {
-    figure.yardstick.in_words(&as_written(figure.published))
+fn criterion_text(figure: &PublishedFigure) -> String {
+    figure.criterion.in_words(&as_written(figure.published))
 }
 
 fn difference(figure: &PublishedFigure) -> Markup {
     html! {
-        b { (figure.arm) } ", " (figure.what) ": the paper prints " (printed(figure)) ", the median found here is "
-        (shown(figure)(figure.found.median)) ", not " @if figure.yardstick != Yardstick::Below { "within " } (yardstick(figure)) ". "
-        @if figure.yardstick == Yardstick::Below {
+        b { (figure.arm) } ", " (figure.label) ": the paper prints " (printed(figure)) ", the median found here is "
+        (number_format(figure)(figure.result.median)) ", not " @if figure.criterion != AgreementCriterion::Below { "within " } (criterion_text(figure)) ". "
+        @if figure.criterion == AgreementCriterion::Below {
             @if figure.within_seeds { "Some seeds do stay below it." }
             @else { "Hardly any seed stays below it." }
         } @else if figure.within_seeds {
@@ -297,7 +297,7 @@ fn failure(claim: &Claim) -> Markup {
         b { (claim.id) } " states: " (claim.claim) ". "
         @if failed.len() == claim.parts.len() { "In the medians, every part fails:" }
         @else { "In the medians, " (failed.len()) " of its " (claim.parts.len()) " parts " (fails(failed.len())) ":" }
-        ul { @for part in &failed { li { (part.what) " (holds for " (share(part.share_of_seeds)) " of the seeds)" } } }
+        ul { @for part in &failed { li { (part.statement) " (holds for " (share(part.share_of_seeds)) " of the seeds)" } } }
     }
 }
 
@@ -310,7 +310,7 @@ fn part_in_words(part: &ClaimPart) -> Markup {
         span.share.yes[part.holds].no[!part.holds] {
             @if part.holds { "✓ " } @else { "✗ " } (share(part.share_of_seeds))
         }
-        (part.what)
+        (part.statement)
     }
 }
 
@@ -339,23 +339,23 @@ const OF_THE_NETWORK: [(&str, &str); 13] = [
 ];
 
 impl Paper<'_> {
-    pub(super) fn about_open(&self) -> Markup {
+    pub(super) fn discrepancies_section(&self) -> Markup {
         html! {
             p {
                 "The paper does not specify everything that a replication needs. The study's file specifies the rest; the \
                  table lists the settings of this run."
             }
-            (self.why_not_the_printed_modulus())
+            (self.modulus_section())
         }
     }
 
     pub(super) fn open_table(&self) -> Table {
         let mut rows: Vec<[String; 3]> = Vec::new();
         if let Some((rig, beam, force_n)) = self.setup() {
-            let modulus = format!("{} GPa", stated(beam.youngs_modulus_pa() / 1e9));
+            let modulus = format!("{} GPa", rig_number(beam.youngs_modulus_pa() / 1e9));
             rows.push(row("Young's modulus", "200 MPa, treated as a misprint", modulus));
             rows.push(row("sensor noise", "none: readings are computed", noise_in_words(rig)));
-            rows.push(row("force", "3 N, known", format!("{} N, known", stated(force_n))));
+            rows.push(row("force", "3 N, known", format!("{} N, known", rig_number(force_n))));
         }
         rows.extend(OF_THE_NETWORK.iter().filter_map(|(key, paper)| self.network_row(key, paper)));
         rows.push(row("iteration", "undefined", "one epoch: every training position shown once"));
@@ -367,7 +367,7 @@ impl Paper<'_> {
             .caption(html! { "Settings of this study and of the paper." })
     }
 
-    fn why_not_the_printed_modulus(&self) -> Markup {
+    fn modulus_section(&self) -> Markup {
         let Some((_, beam, force_n)) = self.setup() else { return Markup::default() };
         if (beam.youngs_modulus_pa() / PRINTED_MODULUS_PA - 1.0).abs() < 1e-6 {
             return Markup::default();
@@ -379,9 +379,9 @@ impl Paper<'_> {
         html! {
             p {
                 "One value is not followed: the paper prints a Young's modulus of 200 MPa. With it, the load in the middle would \
-                 bend this " (stated(beam.length_m() * 1e3)) " mm beam by " (number(sag_m(PRINTED_MODULUS_PA)))
+                 bend this " (rig_number(beam.length_m() * 1e3)) " mm beam by " (number(sag_m(PRINTED_MODULUS_PA)))
                 " m, far outside the small deflections that the beam equation is made for. Steel has 200 GPa, so the value is \
-                 treated as a misprint. With " (stated(beam.youngs_modulus_pa() / 1e9)) " GPa, as here, it bends by "
+                 treated as a misprint. With " (rig_number(beam.youngs_modulus_pa() / 1e9)) " GPa, as here, it bends by "
                 (number(sag_m(beam.youngs_modulus_pa()) * 1e3)) " mm."
             }
         }

@@ -1,6 +1,6 @@
 //! Tests of the drawing of a beam.
 
-use super::{Drawing, see};
+use super::{Drawing, parse_drawing};
 use crate::beam_drawing::BeamDrawing;
 use palpate_mechanics::surface::BeamSupportKind;
 
@@ -25,8 +25,8 @@ fn beam(sensors: usize, load_mm: f64, width_px: u32) -> BeamDrawing {
     }
 }
 
-fn seen(drawing: &BeamDrawing) -> Drawing {
-    see(&drawing.svg())
+fn parse_beam_drawing(drawing: &BeamDrawing) -> Drawing {
+    parse_drawing(&drawing.svg())
 }
 
 fn cases() -> Vec<(String, BeamDrawing)> {
@@ -94,7 +94,7 @@ fn cases() -> Vec<(String, BeamDrawing)> {
 #[test]
 fn texts_lie_inside_the_image_and_apart() {
     for (case, drawing) in cases() {
-        let seen = seen(&drawing);
+        let seen = parse_beam_drawing(&drawing);
         seen.assert_texts_inside(&case);
         seen.assert_texts_apart(&case);
     }
@@ -103,7 +103,7 @@ fn texts_lie_inside_the_image_and_apart() {
 #[test]
 fn lines_and_shapes_lie_inside_the_image() {
     for (case, drawing) in cases() {
-        let seen = seen(&drawing);
+        let seen = parse_beam_drawing(&drawing);
         for (paint, area) in &seen.shapes {
             assert!(super::inside(area, &seen.image), "{case}: {paint:?} at {area:?}");
         }
@@ -113,7 +113,7 @@ fn lines_and_shapes_lie_inside_the_image() {
 #[test]
 fn every_sensor_has_a_probe_and_its_number() {
     for (case, drawing) in cases() {
-        let seen = seen(&drawing);
+        let seen = parse_beam_drawing(&drawing);
         assert_eq!(seen.fills(GREEN).count(), drawing.sensors_mm.len(), "{case}");
         for number in 1..=drawing.sensors_mm.len() {
             assert!(seen.has_text(&number.to_string()), "{case}: no number {number}");
@@ -123,7 +123,7 @@ fn every_sensor_has_a_probe_and_its_number() {
 
 #[test]
 fn length_force_and_deflection_are_stated() {
-    let seen = seen(&beam(8, 100.0, 720));
+    let seen = parse_beam_drawing(&beam(8, 100.0, 720));
     for text in ["400 mm", "3 N", "3.47 mm"] {
         assert!(seen.has_text(text), "{text:?} is missing from {:?}", seen.texts);
     }
@@ -134,7 +134,7 @@ fn the_deflection_is_drawn_as_many_times_larger_as_stated() {
     for factor in [1e-3, 0.1, 0.3, 1.0, 7.0, 100.0] {
         let mut drawing = beam(8, 100.0, 720);
         drawing.deflection_mm.iter_mut().for_each(|point| point.1 *= factor);
-        let seen = seen(&drawing);
+        let seen = parse_beam_drawing(&drawing);
         let shape =
             seen.strokes(BLUE).max_by(|a, b| a.width().total_cmp(&b.width())).expect("the deflected shape");
         let stroke = 2.5;
@@ -154,14 +154,14 @@ fn the_deflection_is_drawn_as_many_times_larger_as_stated() {
 #[test]
 fn the_load_points_at_its_position() {
     for (load_mm, expected) in [(0.0, 40.0), (100.0, 200.0), (400.0, 680.0)] {
-        let seen = seen(&beam(8, load_mm, 720));
+        let seen = parse_beam_drawing(&beam(8, load_mm, 720));
         let arrow = seen.strokes("#d55e00").next().expect("an arrow");
         assert!((arrow.left.midpoint(arrow.right) - expected).abs() < 0.2, "{arrow:?}");
     }
 }
 
 #[test]
-fn what_a_rounding_error_puts_beyond_an_end_is_drawn_at_the_end() {
+fn rounding_errors_beyond_an_end_are_drawn_at_the_end() {
     let beyond = BeamDrawing { sensors_mm: vec![-1e-9, 400.0 + 1e-9], ..beam(0, 400.0 + 1e-9, 720) };
     let at_ends = BeamDrawing { sensors_mm: vec![0.0, 400.0], ..beam(0, 400.0, 720) };
     assert_eq!(beyond.svg(), at_ends.svg());

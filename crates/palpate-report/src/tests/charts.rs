@@ -1,6 +1,6 @@
 //! Tests of charts, also with extreme data.
 
-use super::{Drawing, overlap, see};
+use super::{Drawing, overlap, parse_drawing};
 use crate::drawing::layout::Layout;
 use crate::*;
 use proptest::prelude::*;
@@ -127,7 +127,7 @@ pub(super) fn awkward() -> Vec<(&'static str, Chart)> {
 }
 
 fn seen_all() -> impl Iterator<Item = (&'static str, Drawing)> {
-    awkward().into_iter().map(|(case, chart)| (case, see(&chart_to_svg(&chart))))
+    awkward().into_iter().map(|(case, chart)| (case, parse_drawing(&chart_to_svg(&chart))))
 }
 
 #[test]
@@ -158,14 +158,14 @@ fn legend_and_texts_lie_outside_the_plot() {
         for entry in &layout.legend.entries {
             assert!(!overlap(&entry.area, &plot), "{case}: legend {:?} over plot {plot:?}", entry.area);
         }
-        for (text, area) in see(&chart_to_svg(&chart)).texts {
+        for (text, area) in parse_drawing(&chart_to_svg(&chart)).texts {
             assert!(!overlap(&area, &plot), "{case}: {text:?} {area:?} over plot {plot:?}");
         }
     }
 }
 
 #[test]
-fn legend_names_every_labelled_series_once_or_says_how_many_are_missing() {
+fn legend_names_each_series_once_or_counts_the_missing() {
     for (case, chart) in awkward() {
         let layout = Layout::new(&chart);
         let named = chart.series.iter().filter(|series| !series.label.trim().is_empty()).count();
@@ -183,7 +183,14 @@ fn legend_names_every_labelled_series_once_or_says_how_many_are_missing() {
 
 #[test]
 fn labels_are_shown_letter_by_letter() {
-    let seen = see(&chart_to_svg(&everything(["a < b", "b > c & d", "\"q\" 'r'", "<svg>", "&amp;", "]]>"])));
+    let seen = parse_drawing(&chart_to_svg(&everything([
+        "a < b",
+        "b > c & d",
+        "\"q\" 'r'",
+        "<svg>",
+        "&amp;",
+        "]]>",
+    ])));
     for text in ["a < b", "b > c & d", "\"q\" 'r'", "<svg>", "&amp;", "]]>"] {
         assert!(seen.has_text(text), "{text:?} is missing from {:?}", seen.texts);
     }
@@ -200,7 +207,7 @@ fn both_axes_of_every_chart_can_be_read() {
 
 /// Strokes in the colour of the first series, without the legend.
 fn pieces(chart: &Chart) -> usize {
-    see(&chart_to_svg(chart)).strokes(BLUE).count() - 1
+    parse_drawing(&chart_to_svg(chart)).strokes(BLUE).count() - 1
 }
 
 #[test]
@@ -222,7 +229,7 @@ fn a_logarithmic_axis_skips_values_that_are_not_positive() {
         series: vec![series("", 0, SeriesKind::Points { points: points.clone(), marker: Marker::Circle })],
         ..Chart::default()
     };
-    let discs = |y| see(&chart_to_svg(&chart(y))).fills(BLUE).count();
+    let discs = |y| parse_drawing(&chart_to_svg(&chart(y))).fills(BLUE).count();
     assert_eq!((discs(Axis::linear("y")), discs(Axis::log10("y"))), (4, 2));
 }
 
@@ -235,7 +242,8 @@ fn a_bar_down_to_zero_reaches_the_end_of_a_logarithmic_axis() {
         ..Chart::default()
     };
     let bottom = Layout::new(&chart).plot.bottom;
-    let lowest = see(&chart_to_svg(&chart)).strokes(BLUE).map(|area| area.bottom).fold(0.0, f64::max);
+    let lowest =
+        parse_drawing(&chart_to_svg(&chart)).strokes(BLUE).map(|area| area.bottom).fold(0.0, f64::max);
     assert!((lowest - bottom).abs() < 1.5, "{lowest} against {bottom}");
 }
 
@@ -251,7 +259,7 @@ fn data_outside_a_fixed_range_are_cut_off_at_the_plot() {
     for kind in [line(&far), SeriesKind::Band { points: bands }] {
         let chart = fixed(Chart { series: vec![series("", 0, kind)], ..Chart::default() });
         let plot = Layout::new(&chart).plot;
-        let seen = see(&chart_to_svg(&chart));
+        let seen = parse_drawing(&chart_to_svg(&chart));
         let drawn: Vec<_> = seen.strokes(BLUE).chain(seen.fills(BLUE)).collect();
         assert_eq!(drawn.len(), 1);
         for area in drawn {
@@ -274,7 +282,7 @@ fn data_lie_where_the_axes_say() {
         ..Chart::default()
     };
     let plot = Layout::new(&chart).plot;
-    let seen = see(&chart_to_svg(&chart));
+    let seen = parse_drawing(&chart_to_svg(&chart));
     let disc = seen.fills(BLUE).next().expect("a disc");
     let (x, y) = (disc.left.midpoint(disc.right), disc.top.midpoint(disc.bottom));
     assert!((x - (plot.left + 0.25 * plot.width())).abs() < 0.2, "{x}");
@@ -316,7 +324,7 @@ proptest! {
             marks: vec![Mark::VerticalLine { x: ends.0, label: label.clone() }],
             ..Chart::default()
         };
-        let seen = see(&chart_to_svg(&chart));
+        let seen = parse_drawing(&chart_to_svg(&chart));
         seen.assert_texts_inside("any");
         seen.assert_texts_apart("any");
     }

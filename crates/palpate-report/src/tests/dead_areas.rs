@@ -12,7 +12,7 @@ fn dead_areas_have_their_page() {
         counts: vec![2, 4],
         calibrations: 1,
         tolerance_m: 2e-3,
-        without: vec!["network", "network-lm", "gaussian-process", "influence"],
+        excluded: vec!["network", "network-lm", "gaussian-process", "influence"],
         seed: 0,
     };
     let findings = study.run(Watch::NONE).unwrap();

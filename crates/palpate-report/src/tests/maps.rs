@@ -1,6 +1,6 @@
 //! Tests of heat maps.
 
-use super::see;
+use super::parse_drawing;
 use crate::{HeatMap, HeatPanel, heat_map_to_svg};
 use palpate_estimators::load_profile::Cells;
 use palpate_mechanics::surface::Extent;
@@ -28,7 +28,7 @@ fn texts_of_maps_lie_inside_the_image_and_apart() {
                 let case = format!("{panels} panels, {width_m} m wide");
                 for width_px in [360, 860] {
                     let map = HeatMap { width_px, ..map(panels, width_m, values) };
-                    let seen = see(&heat_map_to_svg(&map));
+                    let seen = parse_drawing(&heat_map_to_svg(&map));
                     seen.assert_texts_inside(&case);
                     seen.assert_texts_apart(&case);
                 }
@@ -48,7 +48,7 @@ fn titles_and_names_are_whole_on_a_phone() {
 
 #[test]
 fn a_cell_without_a_value_stays_grey() {
-    let drawn = |svg: &str| see(svg).shapes.len();
+    let drawn = |svg: &str| parse_drawing(svg).shapes.len();
     let whole = drawn(&heat_map_to_svg(&map(1, 0.3, |i| i as f64)));
     let part = drawn(&heat_map_to_svg(&map(1, 0.3, |i| if i < 5 { f64::NAN } else { i as f64 })));
     assert_eq!(whole - part, 5);

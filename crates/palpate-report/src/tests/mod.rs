@@ -28,7 +28,7 @@ struct Paint {
     fill: Option<String>,
 }
 
-fn see(svg: &str) -> Drawing {
+fn parse_drawing(svg: &str) -> Drawing {
     let document = roxmltree::Document::parse(svg).expect("well-formed SVG");
     let root = document.root_element();
     let image = Rect { left: 0.0, top: 0.0, right: number(root, "width"), bottom: number(root, "height") };

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::{
-    EvaluationReport, Judged, LimitReport, ReportFile, StudyReport, evaluation_report, limit_report,
+    EstimateOrigin, EvaluationReport, LimitReport, ReportFile, StudyReport, evaluation_report, limit_report,
     paper_report, study_report,
 };
 use palpate_estimators::estimator::Estimator;
@@ -139,7 +139,7 @@ fn the_papers_report_has_every_part() {
 }
 
 #[test]
-fn untrained_networks_are_told_of() {
+fn untrained_networks_are_reported() {
     let run = run(&quick_paper(), 1);
     let text = shown_text(page(&paper_report(&run.report())));
     assert!(text.contains("12 of 12 networks did not converge"), "{text}");
@@ -208,7 +208,7 @@ fn quick_rig(max_epochs: u32) -> Rig {
 }
 
 #[test]
-fn an_evaluation_says_whose_answers_it_holds() {
+fn evaluation_names_the_origin_of_the_estimates() {
     let rig = quick_rig(50);
     let recording = rig.simulate(0).unwrap();
     let locator = rig.estimator.fit(&rig.setup, &recording).unwrap();
@@ -216,11 +216,11 @@ fn an_evaluation_says_whose_answers_it_holds() {
     let other = simulate_at(&rig.setup, &positions, 3, 1).unwrap();
     let portions = [Portion { from_m: 0.02, to_m: 0.38 }];
     for (recording, judged, said) in [
-        (&recording, Judged::Locator(&locator), "this recording"),
-        (&other, Judged::Locator(&locator), "another recording"),
+        (&recording, EstimateOrigin::Locator(&locator), "this recording"),
+        (&other, EstimateOrigin::Locator(&locator), "another recording"),
         (
             &other,
-            Judged::CrossValidated { rig: &rig, folds: 5, seed: 3 },
+            EstimateOrigin::CrossValidated { rig: &rig, folds: 5, seed: 3 },
             "Cross-validated by position in 5 folds",
         ),
     ] {
@@ -228,7 +228,7 @@ fn an_evaluation_says_whose_answers_it_holds() {
             title: "Evaluation of <paper>",
             evaluation: &Evaluation::new(&locator, recording).unwrap(),
             recording: &recording.provenance,
-            judged,
+            origin: judged,
             portions: &portions,
             tolerance_m: 2e-3,
         });
@@ -243,7 +243,7 @@ fn an_evaluation_says_whose_answers_it_holds() {
 }
 
 #[test]
-fn an_evaluation_of_nothing_has_a_report() {
+fn empty_evaluation_has_a_report() {
     let rig = quick_rig(5);
     let recording = rig.simulate(0).unwrap();
     let locator = rig.estimator.fit(&rig.setup, &recording).unwrap();
@@ -251,7 +251,7 @@ fn an_evaluation_of_nothing_has_a_report() {
         title: "Nothing",
         evaluation: &Evaluation { extent: Extent::line(0.4).unwrap(), located: Vec::new() },
         recording: &recording.provenance,
-        judged: Judged::Locator(&locator),
+        origin: EstimateOrigin::Locator(&locator),
         portions: &[],
         tolerance_m: 2e-3,
     });
@@ -267,8 +267,8 @@ fn limits(sensors: SensorGroup, force: Force) -> Vec<ReportFile> {
         title: "The limit of <paper>",
         setup: &setup,
         limit: &limit,
-        known: &curve(Force::Known),
-        unknown: &curve(Force::Unknown),
+        known_force: &curve(Force::Known),
+        unknown_force: &curve(Force::Unknown),
         force,
         warnings: &limit_warnings(&limit, 3.0, force, Watch::NONE).unwrap(),
         listed: &[0.0, 0.05, 0.2].map(Position::along),
@@ -277,7 +277,7 @@ fn limits(sensors: SensorGroup, force: Force) -> Vec<ReportFile> {
 }
 
 #[test]
-fn a_limit_is_drawn_and_told() {
+fn limit_is_drawn_and_described() {
     let deflections = |count| Deflection.evenly(count).noise(um(5.0));
     let reactions = Reaction.at_x([mm(0.0), mm(400.0)]).noise(newtons(0.01));
     let cases = [
@@ -312,7 +312,7 @@ fn errors_are_drawn_against_the_limit_where_there_is_one() {
             title: "Errors",
             evaluation: &Evaluation { extent: Extent::line(0.4).unwrap(), located: Vec::new() },
             recording: &recording.provenance,
-            judged: Judged::CrossValidated { rig: &rig, folds: 5, seed: 0 },
+            origin: EstimateOrigin::CrossValidated { rig: &rig, folds: 5, seed: 0 },
             portions: &[],
             tolerance_m: 2e-3,
         };

@@ -66,7 +66,7 @@ fn the_built_in_font_has_the_signs_that_figures_use() {
 }
 
 #[test]
-fn what_is_no_drawing_gives_an_error() {
+fn invalid_svg_is_an_error() {
     assert!(matches!(svg_to_png("no drawing", 1.0), Err(PngError::Svg(_))));
     let svg = Svg::new(320, 240).finish();
     for scale in [0.0, -1.0, 0.001, 1e6, f32::NAN, f32::INFINITY] {

@@ -13,7 +13,7 @@ use palpate_mechanics::units::{Dimension, Unit, format_length_mm};
 
 use crate::error::RigError;
 use crate::rig::Rig;
-use roles::{Left, PositionRole, Roles, name_and_unit, range};
+use roles::{PositionRole, Roles, UnusedReason, name_and_unit, range};
 
 /// Columns by heading or by number from 1.
 #[derive(Clone, Debug, Default)]
@@ -172,7 +172,7 @@ impl FirstRigError {
 /// use palpate_rig::{FirstRig, Hints, Rig};
 ///
 /// let presses = "Ort [mm];Kraft [N];S1;S2\n10,5;1;100;20\n60;2;120;250\n95;1;20;130\n";
-/// let first = FirstRig::guess("presses.csv", presses.as_bytes(), &Hints::default())?;
+/// let first = FirstRig::infer("presses.csv", presses.as_bytes(), &Hints::default())?;
 /// let rig = Rig::from_toml(&first.to_toml("rig.toml"))?;
 /// assert_eq!(rig.setup.surface().extent().length_m(), 0.11);
 /// assert_eq!(rig.setup.read_recording("presses.csv", presses.as_bytes())?.rows[0].force_n, Some(1.0));
@@ -194,13 +194,13 @@ impl FirstRig {
     ///
     /// # Errors
     /// [`FirstRigError`] for an unreadable file or unclear columns.
-    pub fn guess(source: &str, bytes: &[u8], hints: &Hints) -> Result<Self, FirstRigError> {
+    pub fn infer(source: &str, bytes: &[u8], hints: &Hints) -> Result<Self, FirstRigError> {
         let table = Table::read(source, bytes, hints.separator, hints.decimal)?;
         let columns = table.columns.len();
         if columns > MOST_COLUMNS {
             return Err(FirstRigError::TooManyColumns { columns });
         }
-        let roles = Roles::guess(&table, hints)?;
+        let roles = Roles::infer(&table, hints)?;
         let mut first = Self {
             source: source.to_owned(),
             hints: hints.clone(),
@@ -222,7 +222,7 @@ impl FirstRig {
             // Untouched rows can have any position, also off the surface.
             first.sides = first.sides()?;
         }
-        first.warnings = first.looked_at(&recording);
+        first.warnings = first.column_comments(&recording);
         Ok(first)
     }
 
@@ -375,7 +375,7 @@ impl FirstRig {
         let channels: Vec<String> = roles.channels.iter().map(|column| self.key(*column)).collect();
         toml.line(&format!("channels = [{}]", channels.join(", ")), "");
         for (column, left) in &roles.left {
-            toml.comment(&format!("Left alone: {}", self.left_in_words(*column, left)));
+            toml.comment(&format!("Left alone: {}", self.describe_unused_column(*column, left)));
         }
     }
 
@@ -413,18 +413,18 @@ impl FirstRig {
         }
     }
 
-    fn left_in_words(&self, column: usize, left: &Left) -> String {
+    fn describe_unused_column(&self, column: usize, left: &UnusedReason) -> String {
         let heading = &self.table.columns[column].heading;
         let reason = match left {
-            Left::Empty => "it is empty".to_owned(),
-            Left::Words => "it contains words".to_owned(),
-            Left::Word { line, text } => format!("`{text}` on line {line} is not a number"),
-            Left::Gap { line } => format!("it is empty on line {line}"),
-            Left::Unnamed => format!("column {} has no heading", column + 1),
-            Left::Constant(value) => format!("it is {value} in every row"),
-            Left::Dead(value) => format!("it is {value} in every row, so it carries no information"),
-            Left::Counter => "it numbers the rows".to_owned(),
-            Left::Circumstance => {
+            UnusedReason::Empty => "it is empty".to_owned(),
+            UnusedReason::Words => "it contains words".to_owned(),
+            UnusedReason::Word { line, text } => format!("`{text}` on line {line} is not a number"),
+            UnusedReason::Gap { line } => format!("it is empty on line {line}"),
+            UnusedReason::Unnamed => format!("column {} has no heading", column + 1),
+            UnusedReason::Constant(value) => format!("it is {value} in every row"),
+            UnusedReason::Dead(value) => format!("it is {value} in every row, so it carries no information"),
+            UnusedReason::Counter => "it numbers the rows".to_owned(),
+            UnusedReason::Circumstance => {
                 let unit = own_unit(&self.table.columns[column]);
                 let unit = unit.map_or(String::new(), |unit| format!(" and nuisance_unit = \"{unit}\""));
                 format!(
@@ -432,15 +432,15 @@ impl FirstRig {
                     self.key(column)
                 )
             }
-            Left::Single => {
+            UnusedReason::Single => {
                 "if it is a channel, add it to `channels`; if readings depend on it, set it as `nuisance`"
                     .to_owned()
             }
-            Left::OneOfForces => {
+            UnusedReason::OneOfForces => {
                 format!("it is one of several possible forces: set force = {}", self.key(column))
             }
-            Left::Second => "another column has the role that its name suggests".to_owned(),
-            Left::Unit(unit) => format!("palpate does not read it in `{unit}`; convert it"),
+            UnusedReason::Second => "another column has the role that its name suggests".to_owned(),
+            UnusedReason::Unit(unit) => format!("palpate does not read it in `{unit}`; convert it"),
         };
         format!("`{heading}`: {reason}.")
     }
@@ -463,7 +463,7 @@ impl FirstRig {
     fn side(&self, column: usize) -> Result<Side, FirstRigError> {
         let unit = self.unit(column, Dimension::Length)?;
         let heading = &self.table.columns[column].heading;
-        let numbers = self.pressed(column);
+        let numbers = self.press_values(column);
         if numbers.is_empty() {
             return Err(FirstRigError::NoNumbers { flag: "--position", column: heading.clone() });
         }
@@ -475,7 +475,7 @@ impl FirstRig {
         Ok(Side::around(metres(low), metres(high)))
     }
 
-    fn pressed(&self, column: usize) -> Vec<f64> {
+    fn press_values(&self, column: usize) -> Vec<f64> {
         let numbers = self.table.columns[column].numbers().unwrap_or_default();
         let forces = self.roles.force.and_then(|force| self.table.columns[force].numbers());
         let marks = self.roles.untouched.and_then(|untouched| self.table.columns[untouched].marks());
@@ -493,23 +493,23 @@ impl FirstRig {
         if touched.is_empty() { rows().map(|(_, number)| number).collect() } else { touched }
     }
 
-    fn looked_at(&self, recording: &Recording) -> Vec<String> {
-        let left = |(column, left): &(usize, Left)| {
+    fn column_comments(&self, recording: &Recording) -> Vec<String> {
+        let left = |(column, left): &(usize, UnusedReason)| {
             let heading = &self.table.columns[*column].heading;
             match left {
-                Left::Dead(value) => Some(format!(
+                UnusedReason::Dead(value) => Some(format!(
                     "column `{heading}` is {value} in every row and was left out: is it a channel, and is it connected?"
                 )),
-                Left::Word { line, text } => {
+                UnusedReason::Word { line, text } => {
                     Some(format!("column `{heading}` was left out: `{text}` on line {line} is not a number"))
                 }
-                Left::Gap { line } => {
+                UnusedReason::Gap { line } => {
                     Some(format!("column `{heading}` was left out: it is empty on line {line}"))
                 }
-                Left::Unit(unit) => Some(format!(
+                UnusedReason::Unit(unit) => Some(format!(
                     "column `{heading}` was left out: palpate does not read it in `{unit}`; convert it"
                 )),
-                Left::Unnamed => Some(format!(
+                UnusedReason::Unnamed => Some(format!(
                     "column {number} has no heading and was left out; if it is a channel, add {number} to `channels`",
                     number = column + 1
                 )),

@@ -158,7 +158,7 @@ pub(super) struct Roles {
     pub nuisance: Option<usize>,
     pub untouched: Option<usize>,
     pub channels: Vec<usize>,
-    pub left: Vec<(usize, Left)>,
+    pub left: Vec<(usize, UnusedReason)>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -169,7 +169,7 @@ pub(super) enum PositionRole {
 
 /// Reason why a column has no role.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Left {
+pub(super) enum UnusedReason {
     Empty,
     Words,
     Word {
@@ -208,10 +208,10 @@ impl PositionRole {
 
 impl Roles {
     /// Assigns hinted roles, then the likeliest others.
-    pub fn guess(table: &Table, hints: &Hints) -> Result<Self, FirstRigError> {
-        let names: Vec<Name> = (0..table.columns.len()).map(|i| Name::new(table, i)).collect();
-        let guess = Guess { table, names: &names };
-        let told = Told::find(table, hints)?;
+    pub fn infer(table: &Table, hints: &Hints) -> Result<Self, FirstRigError> {
+        let names: Vec<ColumnName> = (0..table.columns.len()).map(|i| ColumnName::new(table, i)).collect();
+        let guess = RoleInference { table, names: &names };
+        let told = ExplicitRoles::find(table, hints)?;
         let untouched = told.untouched.or_else(|| guess.untouched(&told));
         let position = match told.position {
             Some(position) => position,
@@ -236,7 +236,7 @@ impl Roles {
         let blank = |i: &usize| names[*i].words.is_empty() && table.columns[*i].content == Content::Empty;
         let left = (0..names.len()).filter(|i| !roles.contains(i) && !blank(i));
         let reason = |i: usize| match forces.contains(&i) {
-            true if force.is_none() => Left::OneOfForces,
+            true if force.is_none() => UnusedReason::OneOfForces,
             _ => guess.reason(i, force.is_some()),
         };
         let left = left.map(|i| (i, reason(i))).collect();
@@ -245,7 +245,7 @@ impl Roles {
     }
 }
 
-struct Told {
+struct ExplicitRoles {
     position: Option<PositionRole>,
     force: Option<usize>,
     time: Option<usize>,
@@ -254,7 +254,7 @@ struct Told {
     channels: Vec<usize>,
 }
 
-impl Told {
+impl ExplicitRoles {
     fn find(table: &Table, hints: &Hints) -> Result<Self, FirstRigError> {
         let find = |flag: &'static str, name: &Option<String>| {
             name.as_ref().map(|name| find(table, flag, name)).transpose()
@@ -348,7 +348,7 @@ pub(super) fn range(numbers: &[f64]) -> (f64, f64) {
     (low, numbers.iter().copied().fold(f64::NEG_INFINITY, f64::max))
 }
 
-struct Name {
+struct ColumnName {
     /// Lowercase words without the unit.
     words: Vec<String>,
     /// Heading without its final number, if any.
@@ -359,7 +359,7 @@ struct Name {
     has_heading: bool,
 }
 
-impl Name {
+impl ColumnName {
     fn new(table: &Table, index: usize) -> Self {
         let text = &table.columns[index].heading;
         let heading = Heading::parse(text);
@@ -396,13 +396,13 @@ impl Name {
     }
 }
 
-struct Guess<'a> {
+struct RoleInference<'a> {
     table: &'a Table,
-    names: &'a [Name],
+    names: &'a [ColumnName],
 }
 
-impl Guess<'_> {
-    fn columns(&self, taken: &[usize], fit: impl Fn(&Name) -> bool) -> Vec<usize> {
+impl RoleInference<'_> {
+    fn columns(&self, taken: &[usize], fit: impl Fn(&ColumnName) -> bool) -> Vec<usize> {
         let free = (0..self.names.len()).filter(|i| !taken.contains(i) && self.names[*i].has_heading);
         free.filter(|i| fit(&self.names[*i])).collect()
     }
@@ -419,14 +419,14 @@ impl Guess<'_> {
     }
 
     /// Finds a column with a suitable name and both marked and unmarked rows.
-    fn untouched(&self, told: &Told) -> Option<usize> {
+    fn untouched(&self, told: &ExplicitRoles) -> Option<usize> {
         let taken: Vec<usize> = [told.force, told.time, told.nuisance].into_iter().flatten().collect();
         let taken = [taken.as_slice(), told.channels.as_slice()].concat();
         let marks = |i: &usize| {
             let marks = self.table.columns[*i].marks().unwrap_or_default();
             marks.contains(&true) && marks.contains(&false)
         };
-        let named = self.columns(&taken, Name::is_of_untouched);
+        let named = self.columns(&taken, ColumnName::is_of_untouched);
         named.into_iter().find(marks)
     }
 
@@ -443,18 +443,22 @@ impl Guess<'_> {
         if full.is_empty() { gaps.into_iter().filter(varies_between_gaps).collect() } else { full }
     }
 
-    fn position(&self, told: &Told, untouched: Option<usize>) -> Result<PositionRole, FirstRigError> {
+    fn position(
+        &self,
+        told: &ExplicitRoles,
+        untouched: Option<usize>,
+    ) -> Result<PositionRole, FirstRigError> {
         let taken: Vec<usize> =
             [told.force, told.time, told.nuisance, untouched].into_iter().flatten().collect();
         let taken = [taken.as_slice(), told.channels.as_slice()].concat();
-        let of = |fit: &dyn Fn(&Name) -> bool| {
-            let length = |name: &Name| fit(name) && name.measures(Dimension::Length);
+        let of = |fit: &dyn Fn(&ColumnName) -> bool| {
+            let length = |name: &ColumnName| fit(name) && name.measures(Dimension::Length);
             self.places(self.columns(&taken, length))
         };
         let x = of(&|name| name.is(&["x"], &[PLACE]));
         let y = of(&|name| name.is(&["y"], &[PLACE]));
-        let in_lengths = |name: &Name| name.unit.is_some() && !self.in_family(name);
-        let circumstance = |name: &Name| name.is(CIRCUMSTANCES, &[]) || name.is(COUNTERS, &[]);
+        let in_lengths = |name: &ColumnName| name.unit.is_some() && !self.in_family(name);
+        let circumstance = |name: &ColumnName| name.is(CIRCUMSTANCES, &[]) || name.is(COUNTERS, &[]);
         let ranks = [
             of(&|name| name.is(PLACE, &[])),
             [x.as_slice(), y.as_slice()].concat(),
@@ -476,7 +480,7 @@ impl Guess<'_> {
     }
 
     fn no_position(&self, taken: &[usize]) -> FirstRigError {
-        let place = |name: &Name| name.is(PLACE, &[]) || name.is(&["x", "y"], &[PLACE]);
+        let place = |name: &ColumnName| name.is(PLACE, &[]) || name.is(&["x", "y"], &[PLACE]);
         let Some(named) = self.columns(taken, place).first().copied() else {
             return FirstRigError::NoPosition { columns: described(self.table) };
         };
@@ -511,7 +515,8 @@ impl Guess<'_> {
         };
         let named = self.columns(taken, |name| name.is(FORCE, &[]) && name.measures(Dimension::Force));
         let by_unit = || {
-            let newtons = |name: &Name| name.unit.is_some_and(|unit| unit.dimension() == Dimension::Force);
+            let newtons =
+                |name: &ColumnName| name.unit.is_some_and(|unit| unit.dimension() == Dimension::Force);
             self.columns(taken, |name| newtons(name) && !self.in_family(name))
         };
         let columns = if named.is_empty() { by_unit() } else { named };
@@ -553,42 +558,42 @@ impl Guess<'_> {
     }
 
     /// True if another column differs only in its final number.
-    fn in_family(&self, name: &Name) -> bool {
+    fn in_family(&self, name: &ColumnName) -> bool {
         name.stem.1 && self.names.iter().filter(|other| other.stem == name.stem).count() > 1
     }
 
-    fn reason(&self, column: usize, has_force: bool) -> Left {
+    fn reason(&self, column: usize, has_force: bool) -> UnusedReason {
         let name = &self.names[column];
-        let foreign = |name: &Name| {
+        let foreign = |name: &ColumnName| {
             let symbol = name.unit.map(|unit| unit.symbol().to_owned());
-            Left::Unit(name.foreign_unit.clone().or(symbol).unwrap_or_default())
+            UnusedReason::Unit(name.foreign_unit.clone().or(symbol).unwrap_or_default())
         };
         match &self.table.columns[column].content {
-            Content::Empty => Left::Empty,
-            Content::Marks(_) => Left::Words,
-            Content::Gaps { line, .. } => Left::Gap { line: *line },
-            Content::Other { numbers: 0, .. } => Left::Words,
-            Content::Other { line, text, .. } => Left::Word { line: *line, text: text.clone() },
+            Content::Empty => UnusedReason::Empty,
+            Content::Marks(_) => UnusedReason::Words,
+            Content::Gaps { line, .. } => UnusedReason::Gap { line: *line },
+            Content::Other { numbers: 0, .. } => UnusedReason::Words,
+            Content::Other { line, text, .. } => UnusedReason::Word { line: *line, text: text.clone() },
             Content::Numbers(numbers) if !name.has_heading && range(numbers).0 == range(numbers).1 => {
-                Left::Constant(numbers[0])
+                UnusedReason::Constant(numbers[0])
             }
-            _ if !name.has_heading && self.counts(column) => Left::Counter,
-            _ if !name.has_heading => Left::Unnamed,
-            Content::Times => Left::Second,
+            _ if !name.has_heading && self.counts(column) => UnusedReason::Counter,
+            _ if !name.has_heading => UnusedReason::Unnamed,
+            Content::Times => UnusedReason::Second,
             Content::Numbers(numbers) if range(numbers).0 == range(numbers).1 => {
                 let other = is_no_channel(name);
-                if other { Left::Constant(numbers[0]) } else { Left::Dead(numbers[0]) }
+                if other { UnusedReason::Constant(numbers[0]) } else { UnusedReason::Dead(numbers[0]) }
             }
             Content::Numbers(_) if name.is(FORCE, &[]) && !has_force && !name.measures(Dimension::Force) => {
                 foreign(name)
             }
             Content::Numbers(_) if name.is(TIME, &[]) && !name.measures(Dimension::Time) => foreign(name),
-            Content::Numbers(_) if name.is(COUNTERS, &[]) || self.counts(column) => Left::Counter,
-            Content::Numbers(_) if name.is(CIRCUMSTANCES, &[]) => Left::Circumstance,
+            Content::Numbers(_) if name.is(COUNTERS, &[]) || self.counts(column) => UnusedReason::Counter,
+            Content::Numbers(_) if name.is(CIRCUMSTANCES, &[]) => UnusedReason::Circumstance,
             Content::Numbers(_) if [PLACE, FORCE, TIME].iter().any(|names| name.is(names, &[])) => {
-                Left::Second
+                UnusedReason::Second
             }
-            Content::Numbers(_) => Left::Single,
+            Content::Numbers(_) => UnusedReason::Single,
         }
     }
 }
@@ -607,12 +612,12 @@ fn suffixed(name: &str) -> Option<(&str, Unit)> {
     (unit != Unit::NONE).then_some((name, unit))
 }
 
-fn is_no_channel(name: &Name) -> bool {
+fn is_no_channel(name: &ColumnName) -> bool {
     let others = [COUNTERS, CIRCUMSTANCES, TIME, PLACE, FORCE].iter().any(|names| name.is(names, &[]));
     others || name.is(&["x", "y"], &[PLACE]) || name.is_of_untouched()
 }
 
-fn columns_agree(names: &[Name], column: usize) -> bool {
-    let same = |other: &&Name| other.unit == names[column].unit;
+fn columns_agree(names: &[ColumnName], column: usize) -> bool {
+    let same = |other: &&ColumnName| other.unit == names[column].unit;
     names.iter().filter(same).count() > 1
 }

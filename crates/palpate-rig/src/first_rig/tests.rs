@@ -7,7 +7,7 @@ fn presses(heading: &str, row: impl Fn(f64, f64, usize) -> String) -> String {
 }
 
 fn guess(text: &str, hints: &Hints) -> Result<FirstRig, FirstRigError> {
-    FirstRig::guess("presses.csv", text.as_bytes(), hints)
+    FirstRig::infer("presses.csv", text.as_bytes(), hints)
 }
 
 /// Reads the guessed rig.
@@ -47,7 +47,7 @@ fn a_plain_plane_becomes_a_rig() {
 }
 
 #[test]
-fn columns_are_told_by_name_and_unit() {
+fn columns_are_recognized_by_name_and_unit() {
     let named = |heading: &str| {
         let text = presses(heading, |x, force, i| format!("{x},{force},{},{}", x * force, i as f64 - x));
         summary(&text)
@@ -71,7 +71,7 @@ fn columns_are_told_by_name_and_unit() {
 }
 
 #[test]
-fn hints_go_before_guesses() {
+fn hints_take_precedence_over_inference() {
     let text = presses("u,v,S1,S2", |x, force, i| format!("{x},{force},{},{i}", x * force));
     let named = |name: &str| Some(name.to_owned());
     let hints = Hints { position: named("u"), force: named("v"), ..Hints::default() };
@@ -98,7 +98,7 @@ fn hints_go_before_guesses() {
 }
 
 #[test]
-fn channels_that_look_wrong_are_warned_of() {
+fn suspicious_channels_are_reported() {
     let text = presses("Position [mm],Force [N],S1,S2,S3,S4", |x, force, i| {
         let saturated = (x * force).min(100.0);
         let broken = if i == 7 { "NaN".to_owned() } else { x.to_string() };
@@ -111,7 +111,7 @@ fn channels_that_look_wrong_are_warned_of() {
 }
 
 #[test]
-fn surfaces_are_guessed_around_their_presses() {
+fn surfaces_are_inferred_from_their_presses() {
     let side = |low_m, high_m| {
         let Side { origin, size, .. } = Side::around(low_m, high_m);
         (origin, size)
@@ -138,7 +138,7 @@ fn headings_are_written_as_toml_and_comments() {
 }
 
 #[test]
-fn a_rig_that_was_guessed_is_fitted() {
+fn inferred_rig_is_fitted() {
     use palpate_estimators::fit::Fit;
 
     let text = presses("Position [mm],Force [N],S1,S2", |x, force, i| {
@@ -153,7 +153,7 @@ fn a_rig_that_was_guessed_is_fitted() {
 }
 
 #[test]
-fn a_named_position_that_cannot_be_one_is_said_to_be_so() {
+fn invalid_position_column_is_reported() {
     let of = |place: fn(usize) -> String| {
         let rows = (0..30).map(|i| format!("{},{},{}\n", place(i), i, i * i));
         summary(&format!("position_mm,S1,S2\n{}", rows.collect::<String>()))
@@ -207,7 +207,7 @@ fn said_of_heading(heading: &str) -> String {
 }
 
 #[test]
-fn columns_without_a_heading_of_their_own_are_named_by_number() {
+fn columns_without_a_heading_are_named_by_number() {
     let headings = [
         "Position,Force,S1,S2,S2,S4",
         "Position,Force,S1,S2,,S4",

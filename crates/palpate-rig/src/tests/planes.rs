@@ -25,7 +25,7 @@ fn millimetres(positions: impl IntoIterator<Item = Position>) -> Vec<[f64; 2]> {
 }
 
 #[test]
-fn grids_and_pairs_lie_where_they_say() {
+fn grids_and_pairs_are_at_their_positions() {
     let rig = Rig::from_toml(PLANE).unwrap();
     let sensors = millimetres(rig.setup.layout().sensors().iter().map(|sensor| sensor.position));
     assert_eq!(sensors[..4], [[75.0, 50.0], [150.0, 50.0], [225.0, 50.0], [75.0, 100.0]]);

@@ -35,7 +35,7 @@ fn spec(text: &str) -> PlateSpec {
 }
 
 #[test]
-fn edges_and_supports_are_what_the_rig_says() {
+fn edges_and_supports_are_those_of_the_rig() {
     let found = spec(PLATE);
     let place = |x_m, y_m| Position { x_m, y_m };
     assert_eq!((found.length_m, found.width_m, found.elements), (0.3, 0.2, 16));
@@ -105,7 +105,7 @@ fn a_bad_plate_is_refused_with_a_caret() {
 }
 
 #[test]
-fn a_sensor_that_would_read_nothing_is_refused_with_a_caret() {
+fn insensitive_sensor_is_refused_with_a_caret() {
     let simple = PLATE
         .replace("\"free\"", "{ bottom = \"clamped\" }")
         .replace("grid = [3, 3]", "positions = [[\"50 mm\", \"50 mm\"], [\"10 mm\", \"10 mm\"]]");

@@ -23,7 +23,7 @@ fn examples() -> Vec<String> {
 }
 
 #[test]
-fn sections_read_by_themselves_build_what_the_whole_rig_builds() {
+fn separate_sections_build_the_same_rig() {
     let texts = examples();
     assert!(texts.len() >= 20, "{} examples", texts.len());
     for text in texts {

@@ -33,7 +33,7 @@ fn spec(text: &str) -> SupportedBeamSpec {
 }
 
 #[test]
-fn every_support_and_section_can_be_said() {
+fn every_support_and_section_is_accepted() {
     let elastic =
         BeamSupportKind::Elastic { stiffness_n_per_m: 2000.0, rotational_stiffness_nm_per_rad: Some(0.5) };
     let supports = [

@@ -114,10 +114,10 @@ fn tasks_in_any_blocks_and_order_assemble_to_the_whole_study() {
 
 #[test]
 fn shards_merge_to_the_bytes_of_the_whole_study() {
-    let fits: Vec<Trained> = WHOLE
+    let fits: Vec<ArmFit> = WHOLE
         .iter()
         .enumerate()
-        .flat_map(|(arm, outcome)| outcome.fits.iter().map(move |fit| Trained { arm, fit: fit.clone() }))
+        .flat_map(|(arm, outcome)| outcome.fits.iter().map(move |fit| ArmFit { arm, fit: fit.clone() }))
         .collect();
     let tables = StudyTables::new(&STUDY);
     let whole = tables.whole(&fits);
@@ -305,7 +305,7 @@ fn a_task_of_an_unknown_arm_is_refused() {
 }
 
 #[test]
-fn what_is_finished_is_left_out_of_the_tasks() {
+fn finished_fits_are_not_tasks() {
     let study = prepare(SMALL);
     let lanes = study.lanes();
     assert_eq!(study.tasks_left(SEEDS, lanes, &[]), study.tasks(SEEDS, lanes));

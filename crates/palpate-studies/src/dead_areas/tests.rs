@@ -1,7 +1,7 @@
 //! Dead areas of a centroid and of the influence estimator.
 
 use super::*;
-use palpate_estimators::evaluation::{Evaluation, Located};
+use palpate_estimators::evaluation::{EvaluatedContact, Evaluation};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::Extent;
@@ -13,7 +13,7 @@ fn study(counts: &[usize]) -> DeadAreaResults {
         counts: counts.to_vec(),
         calibrations: 1,
         tolerance_m: 2e-3,
-        without: vec!["network", "network-lm", "gaussian-process", "neighbours"],
+        excluded: vec!["network", "network-lm", "gaussian-process", "neighbours"],
         seed: 0,
     };
     study.run(Watch::NONE).unwrap()
@@ -47,7 +47,7 @@ fn dead_areas_are_the_interpretations_and_not_the_counts() {
 #[test]
 fn errors_are_folded_over_the_gaps() {
     let layout = Layout::even(SensorKind::Deflection, 3, 0.4);
-    let off = |x_m: f64, error_m: f64| Located {
+    let off = |x_m: f64, error_m: f64| EvaluatedContact {
         truth: Position::along(x_m),
         force_n: None,
         estimate: Position::along(x_m + error_m),
@@ -66,13 +66,13 @@ fn errors_are_folded_over_the_gaps() {
 }
 
 #[test]
-fn a_stopped_study_finds_nothing() {
+fn stopped_study_has_no_results() {
     let study = DeadAreas {
         rig: Rig::from_toml(RIG_TOML).unwrap(),
         counts: vec![2],
         calibrations: 1,
         tolerance_m: 2e-3,
-        without: vec!["influence", "gaussian-process", "closed-form", "neighbours", "network", "network-lm"],
+        excluded: vec!["influence", "gaussian-process", "closed-form", "neighbours", "network", "network-lm"],
         seed: 0,
     };
     let stopped = study.run(Watch::new(&|_| false)).unwrap_err();

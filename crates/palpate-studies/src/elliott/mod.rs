@@ -17,7 +17,7 @@ use palpate_estimators::network::{InputScale, Network};
 use palpate_estimators::recording::TimedRecording;
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::SimulateError;
-use palpate_estimators::track_errors::{FollowError, TrackErrors, follow};
+use palpate_estimators::track_errors::{TrackErrors, TrackingError, track_recording};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::Bound;
 use palpate_mechanics::sensing::NoiseError;
@@ -122,7 +122,7 @@ pub enum ElliottError {
     Reading(#[from] ReadingError),
     /// Failed tracking.
     #[error(transparent)]
-    Follow(#[from] FollowError),
+    Follow(#[from] TrackingError),
     /// Singular noise.
     #[error(transparent)]
     Noise(#[from] NoiseError),
@@ -170,7 +170,7 @@ impl Elliott {
             let moving = self.rig.simulate_moving(seed.wrapping_add(OTHER_NOISE))?;
             let reduction = KarhunenLoeve::new(&trial.training, &noise_sd);
             let setup = TrialSetup { trial, moving: &moving, reduction: &reduction, seed };
-            let every = self.judge(&setup, watch)?;
+            let every = self.evaluate_chains(&setup, watch)?;
             for (judged, one) in judged.iter_mut().zip(every) {
                 judged.push(one);
             }
@@ -206,7 +206,7 @@ impl Elliott {
         network
     }
 
-    fn judge(&self, setup: &TrialSetup, watch: Watch) -> Result<Vec<ChainErrors>, ElliottError> {
+    fn evaluate_chains(&self, setup: &TrialSetup, watch: Watch) -> Result<Vec<ChainErrors>, ElliottError> {
         let whole = &self.rig.setup;
         let network = Estimator::Network(self.network());
         let mut judged = Vec::new();
@@ -214,7 +214,7 @@ impl Elliott {
             let reduce = |recording| setup.reduction.reduced(recording, count);
             let trial = Split {
                 training: reduce(&setup.trial.training),
-                judged: reduce(&setup.trial.judged),
+                held_out: reduce(&setup.trial.held_out),
                 offsets: None,
                 origin: setup.trial.origin,
             };
@@ -223,18 +223,18 @@ impl Elliott {
             let reduced = without_model(whole, raw_layout(count)).map_err(RigSimulationError::from)?;
             let setup = TrialSetup { trial: &trial, moving: &moving, ..*setup };
             let locator = setup.fit(&reduced, &network, watch)?;
-            judged.push(self.judge_readings(&locator, &setup)?);
+            judged.push(self.evaluate_readings(&locator, &setup)?);
         }
         let locator = setup.fit(whole, &network, watch)?;
-        judged.push(self.judge_readings(&locator, setup)?);
+        judged.push(self.evaluate_readings(&locator, setup)?);
         let locator = setup.fit(whole, &self.rig.estimator, watch)?;
-        judged.push(self.judge_readings(&locator, setup)?);
-        judged.extend(self.judge_tracks(&locator, setup)?);
+        judged.push(self.evaluate_readings(&locator, setup)?);
+        judged.extend(self.evaluate_tracks(&locator, setup)?);
         Ok(judged)
     }
 
-    fn judge_readings(&self, locator: &Locator, setup: &TrialSetup) -> Result<ChainErrors, ElliottError> {
-        let mut pressed = Evaluation::new(locator, &setup.trial.judged)?;
+    fn evaluate_readings(&self, locator: &Locator, setup: &TrialSetup) -> Result<ChainErrors, ElliottError> {
+        let mut pressed = Evaluation::new(locator, &setup.trial.held_out)?;
         let extent = self.rig.setup.surface().extent();
         pressed.located.retain(|located| is_inner(located.truth, extent));
         let moving = Evaluation::new(locator, &setup.moving.recording)?;
@@ -246,8 +246,12 @@ impl Elliott {
     }
 
     /// Errors of filter and smoother.
-    fn judge_tracks(&self, locator: &Locator, setup: &TrialSetup) -> Result<[ChainErrors; 2], ElliottError> {
-        let followed = follow(locator, TrackerConfig::default(), setup.moving)?;
+    fn evaluate_tracks(
+        &self,
+        locator: &Locator,
+        setup: &TrialSetup,
+    ) -> Result<[ChainErrors; 2], ElliottError> {
+        let followed = track_recording(locator, TrackerConfig::default(), setup.moving)?;
         let (truths, extent) = (setup.moving.truths(), self.rig.setup.surface().extent());
         let judge = |tracks: &[Track]| -> Result<ChainErrors, ElliottError> {
             let errors = TrackErrors::new(tracks, &truths, extent).ok_or(ElliottError::NothingTracked)?;
@@ -266,7 +270,7 @@ impl Elliott {
             .iter()
             .map(|sensor| model.response_function(sensor.kind, sensor.position))
             .collect();
-        let judged = trials.first().map_or(&[][..], |trial| &trial.judged.rows);
+        let judged = trials.first().map_or(&[][..], |trial| &trial.held_out.rows);
         let inner = judged.iter().filter(|row| is_inner(row.position, model.extent()));
         let at = |position| functions.iter().map(|f| f.gradient(Contact { position, force_n })).collect();
         Ok(inner.map(|row| at(row.position)).collect())
@@ -312,7 +316,7 @@ struct TrialSetup<'a> {
 
 impl TrialSetup<'_> {
     fn fit(&self, of: &Setup, estimator: &Estimator, watch: Watch) -> Result<Locator, FitError> {
-        estimator.fit_alone(FitTask::new(of, &self.trial.training).seed(self.seed).watch(watch))
+        estimator.fit_unchecked(FitTask::new(of, &self.trial.training).seed(self.seed).watch(watch))
     }
 }
 

@@ -77,7 +77,7 @@ fn the_chain_needs_a_few_components_and_the_influence_locator_beats_it() {
 }
 
 #[test]
-fn a_stopped_study_finds_nothing_and_components_must_be_there() {
+fn stopped_study_has_no_results_and_needs_components() {
     let stopped = study(&[2], 1_000).run(Watch::new(&|_| false)).unwrap_err();
     assert!(Cancelled::caused(&stopped), "{stopped}");
     let told = study(&[26], 1_000).run(Watch::NONE).unwrap_err().to_string();

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::COUNTS;
 use crate::results::average_percent;
-use crate::{ArmOutcome, Judging, TrainedSeed};
+use crate::{ArmOutcome, EvaluationSettings, TrainedSeed};
 use palpate_estimators::evaluation::Portion;
 use palpate_mechanics::contact::Position;
 
@@ -27,7 +27,8 @@ pub struct Claim {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ClaimPart {
     /// Statement in words.
-    pub what: String,
+    #[serde(rename = "what")]
+    pub statement: String,
     /// True if the medians confirm it.
     pub holds: bool,
     /// Share of the seeds that confirm it, 0 to 1.
@@ -44,8 +45,8 @@ const LINEAR_FACTOR: f64 = 2.0;
 const GOOD: Portion = Portion { from_m: 0.060, to_m: 0.300 };
 
 /// Checks the claims C1 to C8; omits claims with missing arms.
-pub fn claims(outcomes: &[ArmOutcome], judging: &Judging) -> Vec<Claim> {
-    let table = Table { outcomes, judging };
+pub fn claims(outcomes: &[ArmOutcome], judging: &EvaluationSettings) -> Vec<Claim> {
+    let table = Table { outcomes, settings: judging };
     let claims = [
         (
             "C1",
@@ -80,7 +81,7 @@ pub fn claims(outcomes: &[ArmOutcome], judging: &Judging) -> Vec<Claim> {
         ),
         ("C8", "the location error is far below the sensor pitch of 44.4 mm", c8()),
     ];
-    claims.into_iter().filter_map(|(id, claim, parts)| table.judge(id, claim, &parts)).collect()
+    claims.into_iter().filter_map(|(id, claim, parts)| table.check_claim(id, claim, &parts)).collect()
 }
 
 #[derive(Clone, Copy)]
@@ -96,15 +97,15 @@ enum Figure {
     Effective,
 }
 
-type Look<'a> = dyn Fn(&str, Figure) -> f64 + 'a;
+type FigureLookup<'a> = dyn Fn(&str, Figure) -> f64 + 'a;
 
 struct Part {
-    what: String,
-    test: Box<dyn Fn(&Look) -> bool>,
+    statement: String,
+    test: Box<dyn Fn(&FigureLookup) -> bool>,
 }
 
-fn part(what: impl Into<String>, test: impl Fn(&Look) -> bool + 'static) -> Part {
-    Part { what: what.into(), test: Box::new(test) }
+fn part(what: impl Into<String>, test: impl Fn(&FigureLookup) -> bool + 'static) -> Part {
+    Part { statement: what.into(), test: Box::new(test) }
 }
 
 fn arm(family: &str, count: u32) -> String {
@@ -123,7 +124,7 @@ fn c1() -> Vec<Part> {
 
 fn c2() -> Vec<Part> {
     let family = |family: &'static str| {
-        let error = move |look: &Look| COUNTS.map(|n| look(&arm(family, n), Figure::Error));
+        let error = move |look: &FigureLookup| COUNTS.map(|n| look(&arm(family, n), Figure::Error));
         let falls = part(format!("{family}: the error falls from 10 to 20 to 30"), move |look| {
             let [ten, twenty, thirty] = error(look);
             ten > twenty && twenty > thirty
@@ -157,7 +158,7 @@ fn c4() -> Vec<Part> {
 }
 
 fn c5() -> Vec<Part> {
-    let epochs = |look: &Look, family: &str| COUNTS.map(|n| look(&arm(family, n), Figure::Epochs));
+    let epochs = |look: &FigureLookup, family: &str| COUNTS.map(|n| look(&arm(family, n), Figure::Epochs));
     let grow = |family: &'static str| {
         part(format!("{family}: iterations grow from 10 to 20 to 30"), move |look| {
             let [ten, twenty, thirty] = epochs(look, family);
@@ -194,7 +195,7 @@ fn c6() -> Vec<Part> {
 }
 
 fn c7() -> Vec<Part> {
-    let effective = |look: &Look, family: &str, n: u32| look(&arm(family, n), Figure::Effective);
+    let effective = |look: &FigureLookup, family: &str, n: u32| look(&arm(family, n), Figure::Effective);
     let largest = |n: u32| {
         part(format!("n = {n}: 4 in the middle has the largest effective length"), move |look| {
             let four = effective(look, "middle4", n);
@@ -220,11 +221,11 @@ fn c8() -> Vec<Part> {
 
 struct Table<'a> {
     outcomes: &'a [ArmOutcome],
-    judging: &'a Judging,
+    settings: &'a EvaluationSettings,
 }
 
 impl Table<'_> {
-    fn judge(&self, id: &'static str, claim: &'static str, parts: &[Part]) -> Option<Claim> {
+    fn check_claim(&self, id: &'static str, claim: &'static str, parts: &[Part]) -> Option<Claim> {
         let seeds = self.outcomes.iter().map(|outcome| outcome.fits.len()).min().unwrap_or(0);
         let asked = std::cell::Cell::new(true);
         let median = |name: &str, figure: Figure| {
@@ -246,7 +247,7 @@ impl Table<'_> {
         let judged: Vec<ClaimPart> = parts
             .iter()
             .map(|part| ClaimPart {
-                what: part.what.clone(),
+                statement: part.statement.clone(),
                 holds: (part.test)(&median),
                 share_of_seeds: share(&|seed| (part.test)(&of_seed(seed))),
             })
@@ -272,7 +273,7 @@ impl Table<'_> {
                 positions.fold(f64::NEG_INFINITY, f64::max) / evaluation.extent.length_m() * 100.0
             }
             Figure::Epochs => f64::from(fit.training.unwrap_or_default().epochs),
-            Figure::Effective => evaluation.effective_percent(self.judging.tolerance_m),
+            Figure::Effective => evaluation.effective_percent(self.settings.tolerance_m),
         }
     }
 }

@@ -5,7 +5,7 @@ mod claims;
 mod published;
 
 pub use claims::{Claim, ClaimPart, claims};
-pub use published::{Agreement, PublishedFigure, Yardstick, published_figures};
+pub use published::{Agreement, AgreementCriterion, PublishedFigure, published_figures};
 
 /// Study file `studies/paper.toml`.
 pub const STUDY_TOML: &str = include_str!("paper.toml");

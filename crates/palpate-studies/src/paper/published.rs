@@ -8,7 +8,7 @@ use palpate_estimators::evaluation::Quantiles;
 /// Criterion of agreement with a published figure.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Yardstick {
+pub enum AgreementCriterion {
     /// Largest difference, in the figure's unit.
     Within(f64),
     /// Largest ratio of the larger to the smaller.
@@ -17,7 +17,7 @@ pub enum Yardstick {
     Below,
 }
 
-impl Yardstick {
+impl AgreementCriterion {
     fn accepts(self, published: f64, median: f64) -> bool {
         match self {
             Self::Within(difference) => (published - median).abs() <= difference,
@@ -48,7 +48,7 @@ enum Figure {
 }
 
 impl Figure {
-    fn spread(self, arm: &ArmResults) -> Option<Quantiles> {
+    fn quantiles(self, arm: &ArmResults) -> Option<Quantiles> {
         Some(match self {
             Self::Epochs => arm.epochs?,
             Self::Error => arm.error_percent,
@@ -71,13 +71,13 @@ impl Figure {
 
     /// Errors within 0.6 points (0.25 below 1 %), effective lengths within 6 points, iterations within a
     /// factor of 3.
-    fn yardstick(self, published: f64) -> Yardstick {
+    fn criterion(self, published: f64) -> AgreementCriterion {
         match self {
-            Self::Epochs => Yardstick::Factor(3.0),
-            Self::PortionMaxError(_) => Yardstick::Below,
-            Self::EffectiveLength => Yardstick::Within(6.0),
-            Self::Error | Self::PortionError(_) if published < 1.0 => Yardstick::Within(0.25),
-            Self::Error | Self::PortionError(_) => Yardstick::Within(0.6),
+            Self::Epochs => AgreementCriterion::Factor(3.0),
+            Self::PortionMaxError(_) => AgreementCriterion::Below,
+            Self::EffectiveLength => AgreementCriterion::Within(6.0),
+            Self::Error | Self::PortionError(_) if published < 1.0 => AgreementCriterion::Within(0.25),
+            Self::Error | Self::PortionError(_) => AgreementCriterion::Within(0.6),
         }
     }
 }
@@ -110,14 +110,17 @@ pub struct PublishedFigure {
     /// Arm.
     pub arm: &'static str,
     /// Figure in words, with its unit.
-    pub what: &'static str,
+    #[serde(rename = "what")]
+    pub label: &'static str,
     /// Published value.
     pub published: f64,
     /// Quantiles over the seeds.
     #[serde(flatten)]
-    pub found: Quantiles,
+    #[serde(rename = "found")]
+    pub result: Quantiles,
     /// Criterion of agreement.
-    pub yardstick: Yardstick,
+    #[serde(rename = "yardstick")]
+    pub criterion: AgreementCriterion,
     /// True if the median agrees.
     pub agrees: bool,
     /// True within the 5th to 95th percentile; for a bound, above the 5th.
@@ -151,14 +154,23 @@ impl Agreement {
 /// Compares all published figures among the results.
 pub fn published_figures(results: &StudyResults) -> Vec<PublishedFigure> {
     let beside = |&(arm, figure, published): &(&'static str, Figure, f64)| {
-        let found = figure.spread(results.arm(arm)?)?;
+        let found = figure.quantiles(results.arm(arm)?)?;
         let (key, what) = figure.name();
-        let yardstick = figure.yardstick(published);
+        let yardstick = figure.criterion(published);
         let agrees = yardstick.accepts(published, found.median);
         let within_seeds =
-            found.p05 <= published && (yardstick == Yardstick::Below || published <= found.p95);
+            found.p05 <= published && (yardstick == AgreementCriterion::Below || published <= found.p95);
         let id = format!("{arm}.{key}");
-        Some(PublishedFigure { id, arm, what, published, found, yardstick, agrees, within_seeds })
+        Some(PublishedFigure {
+            id,
+            arm,
+            label: what,
+            published,
+            result: found,
+            criterion: yardstick,
+            agrees,
+            within_seeds,
+        })
     };
     PUBLISHED.iter().filter_map(beside).collect()
 }
@@ -169,11 +181,11 @@ mod tests {
 
     #[test]
     fn yardsticks_measure_both_ways() {
-        assert!(Yardstick::Within(0.6).accepts(3.6, 3.01));
-        assert!(!Yardstick::Within(0.6).accepts(3.6, 4.21));
-        assert!(Yardstick::Factor(3.0).accepts(26_850.0, 9_000.0));
-        assert!(!Yardstick::Factor(3.0).accepts(26_850.0, 8_900.0));
-        assert!(!Yardstick::Factor(3.0).accepts(26_850.0, 81_000.0));
-        assert!(!Yardstick::Below.accepts(0.5, 0.5));
+        assert!(AgreementCriterion::Within(0.6).accepts(3.6, 3.01));
+        assert!(!AgreementCriterion::Within(0.6).accepts(3.6, 4.21));
+        assert!(AgreementCriterion::Factor(3.0).accepts(26_850.0, 9_000.0));
+        assert!(!AgreementCriterion::Factor(3.0).accepts(26_850.0, 8_900.0));
+        assert!(!AgreementCriterion::Factor(3.0).accepts(26_850.0, 81_000.0));
+        assert!(!AgreementCriterion::Below.accepts(0.5, 0.5));
     }
 }

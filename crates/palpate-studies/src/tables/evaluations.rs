@@ -4,9 +4,9 @@
 //! % interval contains the contact, else 0; - without an interval) and `interval_scores_m` (m, or -). Floats
 //! read back to the last bit.
 
-use super::super::run::{PreparedStudy, Trained, TrainedSeed};
+use super::super::run::{ArmFit, PreparedStudy, TrainedSeed};
 use super::{RowProblem, fit_of, read_cell};
-use palpate_estimators::evaluation::{Evaluation, Located};
+use palpate_estimators::evaluation::{EvaluatedContact, Evaluation};
 use palpate_estimators::recording::csv_row;
 use palpate_mechanics::contact::Position;
 
@@ -20,12 +20,13 @@ pub fn header() -> String {
     csv_row(COLUMNS)
 }
 
-pub fn row(study: &PreparedStudy, Trained { arm, fit }: &Trained) -> String {
+pub fn row(study: &PreparedStudy, ArmFit { arm, fit }: &ArmFit) -> String {
     let located = &fit.evaluation.located;
     let estimates: Vec<String> = located.iter().map(|at| at.estimate.x_m.to_string()).collect();
     let held: String = located.iter().map(|at| character(at.covered)).collect();
-    let score =
-        |at: &Located| at.interval_score_m.map_or_else(|| NOT_TOLD.to_owned(), |score| score.to_string());
+    let score = |at: &EvaluatedContact| {
+        at.interval_score_m.map_or_else(|| NOT_TOLD.to_owned(), |score| score.to_string())
+    };
     let scores: Vec<String> = located.iter().map(score).collect();
     let cells = [
         study.study.arms[*arm].name.clone(),
@@ -45,7 +46,7 @@ fn character(held: Option<bool>) -> char {
     }
 }
 
-pub fn read(study: &PreparedStudy, row: &str) -> Result<Trained, RowProblem> {
+pub fn read(study: &PreparedStudy, row: &str) -> Result<ArmFit, RowProblem> {
     let cells: Vec<&str> = row.split(',').collect();
     let [arm_name, seed, estimates, held, scores] = cells[..] else {
         return Err(RowProblem::Cells { found: cells.len(), wanted: COLUMNS.len() });
@@ -56,12 +57,12 @@ pub fn read(study: &PreparedStudy, row: &str) -> Result<Trained, RowProblem> {
     }
     let contacts = study.contacts(arm);
     let estimates_m = numbers(ESTIMATES, estimates, contacts.len())?;
-    let held = held.chars().map(held_from).collect::<Result<Vec<_>, _>>()?;
+    let held = held.chars().map(parse_coverage).collect::<Result<Vec<_>, _>>()?;
     check_count(HELD, held.len(), contacts.len())?;
     let scores_m = numbers(SCORES, scores, contacts.len())?;
     let mut located = Vec::with_capacity(contacts.len());
     for (i, contact) in contacts.iter().enumerate() {
-        located.push(Located {
+        located.push(EvaluatedContact {
             truth: contact.position,
             force_n: Some(contact.force_n),
             estimate: Position::along(estimates_m[i].ok_or_else(|| not_finite(ESTIMATES, NOT_TOLD))?),
@@ -73,7 +74,7 @@ pub fn read(study: &PreparedStudy, row: &str) -> Result<Trained, RowProblem> {
     }
     let extent = study.study.arms[arm].rig.setup.surface().extent();
     let evaluation = Evaluation { extent, located };
-    Ok(Trained { arm, fit: TrainedSeed { seed, training: None, weights: Vec::new(), evaluation } })
+    Ok(ArmFit { arm, fit: TrainedSeed { seed, training: None, weights: Vec::new(), evaluation } })
 }
 
 fn numbers(column: &'static str, cell: &str, readings: usize) -> Result<Vec<Option<f64>>, RowProblem> {
@@ -95,7 +96,7 @@ fn not_finite(column: &'static str, value: &str) -> RowProblem {
     RowProblem::Cell { column, found: super::shortened(value), wanted: FINITE }
 }
 
-fn held_from(character: char) -> Result<Option<bool>, RowProblem> {
+fn parse_coverage(character: char) -> Result<Option<bool>, RowProblem> {
     match character {
         '1' => Ok(Some(true)),
         '0' => Ok(Some(false)),

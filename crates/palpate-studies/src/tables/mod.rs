@@ -8,7 +8,7 @@ mod networks;
 
 use std::collections::{HashMap, HashSet};
 
-use super::run::{PreparedStudy, Trained};
+use super::run::{ArmFit, PreparedStudy};
 use super::task::{MOST_SEEDS, Shard, Task};
 use palpate_rig::Study;
 
@@ -88,7 +88,7 @@ impl TableKind {
 #[derive(Clone, Debug, Default)]
 pub struct Checkpoint {
     /// Fits, possibly of more seeds than requested.
-    pub done: Vec<Trained>,
+    pub done: Vec<ArmFit>,
     /// Fits without their row in `evaluations.csv`.
     pub without_evaluation: usize,
     /// Tables with a skipped, incomplete last line.
@@ -253,7 +253,7 @@ impl<'a> StudyTables<'a> {
     }
 
     /// Formats the rows of a fit.
-    pub fn rows(&self, trained: &Trained) -> FitRows {
+    pub fn rows(&self, trained: &ArmFit) -> FitRows {
         let is_kept_by_weights = self.study.keeps_weights(trained.arm);
         FitRows {
             networks: networks::row(self.study, trained),
@@ -266,8 +266,8 @@ impl<'a> StudyTables<'a> {
     }
 
     /// Formats whole tables, sorted by arm and seed.
-    pub fn whole(&self, fits: &[Trained]) -> FitRows {
-        let mut sorted: Vec<&Trained> = fits.iter().collect();
+    pub fn whole(&self, fits: &[ArmFit]) -> FitRows {
+        let mut sorted: Vec<&ArmFit> = fits.iter().collect();
         sorted.sort_by_key(|trained| (trained.arm, trained.fit.seed));
         let mut whole = self.headings();
         sorted.into_iter().for_each(|trained| whole.push(&self.rows(trained)));
@@ -300,7 +300,7 @@ impl<'a> StudyTables<'a> {
     }
 
     /// Reads the networks, and the fits of other estimators.
-    fn read_networks(&self, rows: &[(usize, &str)]) -> Result<(Vec<Trained>, Vec<Fit>), CheckpointError> {
+    fn read_networks(&self, rows: &[(usize, &str)]) -> Result<(Vec<ArmFit>, Vec<Fit>), CheckpointError> {
         let (mut restored, mut others, mut seen) = (Vec::new(), Vec::new(), HashMap::new());
         let table = TableKind::Networks;
         for (line, row) in rows {
@@ -315,7 +315,7 @@ impl<'a> StudyTables<'a> {
         Ok((restored, others))
     }
 
-    fn read_evaluations(&self, rows: &[(usize, &str)]) -> Result<Vec<Trained>, CheckpointError> {
+    fn read_evaluations(&self, rows: &[(usize, &str)]) -> Result<Vec<ArmFit>, CheckpointError> {
         let (mut restored, mut seen) = (Vec::new(), HashMap::new());
         let table = TableKind::Evaluations;
         for (line, row) in rows {

@@ -7,7 +7,7 @@
 //! weights of the nodes before it, then its bias, if any. Inputs are in the order of the layout.
 
 use super::super::results::percent;
-use super::super::run::{PreparedStudy, Trained};
+use super::super::run::{ArmFit, PreparedStudy};
 use super::{RowProblem, fit_of, read_cell};
 use palpate_estimators::network::{TrainingOutcome, TrainingStatus};
 use palpate_estimators::recording::csv_row;
@@ -21,7 +21,7 @@ pub fn header(study: &PreparedStudy) -> String {
     csv_row(columns)
 }
 
-pub fn row(study: &PreparedStudy, trained: &Trained) -> String {
+pub fn row(study: &PreparedStudy, trained: &ArmFit) -> String {
     let outcome = &trained.fit.training;
     let told = |told: fn(&TrainingOutcome) -> String| outcome.as_ref().map_or_else(String::new, told);
     let weights: Vec<String> = trained.fit.weights.iter().map(f64::to_string).collect();
@@ -37,8 +37,8 @@ pub fn row(study: &PreparedStudy, trained: &Trained) -> String {
     csv_row(cells)
 }
 
-fn metrics(study: &PreparedStudy, trained: Option<&Trained>) -> Vec<(String, f64)> {
-    let judging = study.judging();
+fn metrics(study: &PreparedStudy, trained: Option<&ArmFit>) -> Vec<(String, f64)> {
+    let judging = study.evaluation_settings();
     let value = |portion, pick| {
         trained.and_then(|trained| percent(&trained.fit.evaluation, portion, pick)).unwrap_or(f64::NAN)
     };
@@ -71,7 +71,7 @@ pub fn restore(
     study: &PreparedStudy,
     (arm, seed): (usize, u64),
     cells: &[&str],
-) -> Result<Trained, RowProblem> {
+) -> Result<ArmFit, RowProblem> {
     let [_, _, epochs, status, error, .., weights] = cells else {
         return Err(RowProblem::Cells { found: cells.len(), wanted: OUTCOME_COLUMNS.len() + 1 });
     };

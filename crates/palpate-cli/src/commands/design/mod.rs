@@ -5,7 +5,7 @@ mod sensors;
 
 pub use sensors::help;
 
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::{input, output};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
@@ -27,27 +27,27 @@ Examples:
 #[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
     #[command(subcommand)]
-    what: What,
+    what: DesignCommand,
 }
 
 #[derive(clap::Subcommand)]
-enum What {
+enum DesignCommand {
     Sensors(sensors::Arguments),
     Positions(positions::Arguments),
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     match &arguments.what {
-        What::Sensors(arguments) => sensors::run(arguments),
-        What::Positions(arguments) => positions::run(arguments),
+        DesignCommand::Sensors(arguments) => sensors::run(arguments),
+        DesignCommand::Positions(arguments) => positions::run(arguments),
     }
 }
 
-fn say_files(rig: Option<&Path>, report_folder: Option<&Path>) -> Result<(), Failure> {
+fn print_files(rig: Option<&Path>, report_folder: Option<&Path>) -> Result<(), Failure> {
     if let Some(path) = rig {
-        output::say(format!("\nRig: {}", path.display()))?;
+        output::print_line(format!("\nRig: {}", path.display()))?;
     }
-    output::say_report("\n", report_folder)
+    output::print_report_path("\n", report_folder)
 }
 
 /// Applies `change` to the rig `text`; `path` is the new file.
@@ -58,13 +58,17 @@ fn changed_rig(
     change: impl FnOnce(&mut DocumentMut),
 ) -> Result<(Rig, String), Failure> {
     let written = with_changes(text, change)
-        .map_err(|error| Complaint::new(format!("cannot put the {what} into the rig: {error}")))?;
+        .map_err(|error| UserError::new(format!("cannot put the {what} into the rig: {error}")))?;
     // The rest of the rig must be consistent with the change.
     Ok((input::parse_rig(path, &written)?, written))
 }
 
 fn design_complaint(error: &(dyn std::error::Error + 'static), rig: &Path, help: &str) -> Failure {
-    if Cancelled::caused(error) { Failure::stopped() } else { Complaint::about(rig, error).help(help).into() }
+    if Cancelled::caused(error) {
+        Failure::stopped()
+    } else {
+        UserError::for_path(rig, error).help(help).into()
+    }
 }
 
 /// Converts a position to one length on a line, two on a plane.

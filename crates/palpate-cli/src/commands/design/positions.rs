@@ -1,7 +1,7 @@
 //! `palpate design positions`: training positions, compared with even ones; and the next press of a
 //! recording.
 
-use super::{changed_rig, design_complaint, say_files, to_micrometre, toml_position};
+use super::{changed_rig, design_complaint, print_files, to_micrometre, toml_position};
 use crate::failure::Failure;
 use crate::input::{self, RecordingFiles};
 use crate::json::object;
@@ -10,7 +10,8 @@ use crate::progress::Observer;
 use crate::remark::remark;
 use crate::target::{Inputs, Target, TargetFolder};
 use palpate_design::positions::{
-    Advice, Placed, Placement, PositionDesign, PositionError, PositionProblem, best_placed, next_press,
+    Advice, Placement, PositionDesign, PositionError, PositionProblem, VerifiedPositions, best_placed,
+    next_press,
 };
 use palpate_estimators::recording::Recording;
 use palpate_mechanics::contact::Position;
@@ -81,7 +82,7 @@ struct Outcome<'a> {
     rig: &'a Path,
     estimator: &'static str,
     problem: &'a PositionProblem,
-    placed: Vec<Placed>,
+    placed: Vec<VerifiedPositions>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -109,10 +110,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         write_report(&outcome, &rig, folder)?;
     }
     if arguments.json {
-        return output::say_json(&to_json(&outcome));
+        return output::print_json(&to_json(&outcome));
     }
     print(&outcome)?;
-    say_files(arguments.out.as_deref(), arguments.report.as_deref())
+    print_files(arguments.out.as_deref(), arguments.report.as_deref())
 }
 
 fn what_to_design(arguments: &Arguments, rig: &Rig) -> PositionDesign {
@@ -181,7 +182,7 @@ fn help(error: &PositionError) -> &'static str {
 
 fn print(outcome: &Outcome) -> Result<(), Failure> {
     let (problem, design) = (outcome.problem, outcome.problem.design());
-    output::say(format!(
+    output::print_line(format!(
         "{}: {} training positions, {} press{} each, for the `{}` estimator; {} contacts, force {}; {} calibrations verify\n",
         outcome.rig.display(),
         design.count,
@@ -192,14 +193,14 @@ fn print(outcome: &Outcome) -> Result<(), Failure> {
         problem.force().name(),
         design.verifications,
     ))?;
-    output::say(errors(outcome))?;
-    output::say("")?;
+    output::print_line(errors(outcome))?;
+    output::print_line("")?;
     for placed in &outcome.placed {
         let places = problem.extent().places_in_words(&placed.positions);
-        output::say(format!("{}: {places}", placed.placement.name()))?;
+        output::print_line(format!("{}: {places}", placed.placement.name()))?;
     }
     match best_placed(&outcome.placed) {
-        Some(best) => output::say(format!("\nBest: {}", gain(outcome, best))),
+        Some(best) => output::print_line(format!("\nBest: {}", gain(outcome, best))),
         None => Ok(()),
     }
 }
@@ -227,11 +228,11 @@ fn figure(value: f64) -> String {
     if value >= 0.01 || value == 0.0 { format!("{value:.3}") } else { format!("{value:.1e}") }
 }
 
-fn even<'a>(outcome: &'a Outcome) -> Option<&'a Placed> {
+fn even<'a>(outcome: &'a Outcome) -> Option<&'a VerifiedPositions> {
     outcome.placed.iter().find(|placed| placed.placement == Placement::Even)
 }
 
-fn gain(outcome: &Outcome, best: &Placed) -> String {
+fn gain(outcome: &Outcome, best: &VerifiedPositions) -> String {
     let (name, best_m) = (best.placement.name(), best.verification.median_error_m);
     match even(outcome).map(|even| even.verification.median_error_m) {
         _ if best.placement == Placement::Even => {
@@ -249,7 +250,7 @@ fn gain(outcome: &Outcome, best: &Placed) -> String {
 
 fn to_json(outcome: &Outcome) -> impl Serialize {
     let (problem, asked) = (outcome.problem, outcome.problem.design());
-    let design = |placed: &Placed| {
+    let design = |placed: &VerifiedPositions| {
         let told = &placed.verification;
         object! {
             "method": placed.placement,
@@ -307,7 +308,7 @@ fn advise(arguments: &Arguments, rig: &Rig, recording: &Recording) -> Result<(),
         .watch(|watch| next_press(&rig.setup, recording, &design, watch))
         .map_err(|error| complaint(&error, &arguments.rig))?;
     if arguments.json {
-        return output::say_json(&advice_to_json(arguments, &advice));
+        return output::print_json(&advice_to_json(arguments, &advice));
     }
     print_advice(&advice, rig.setup.surface().extent())
 }
@@ -338,7 +339,7 @@ fn advice_to_json(arguments: &Arguments, advice: &Advice) -> impl Serialize {
 }
 
 fn print_advice(advice: &Advice, extent: Extent) -> Result<(), Failure> {
-    output::say(format!(
+    output::print_line(format!(
         "{} presses at {} positions: expected error {:.4} mm; with endless presses {:.4} mm, {:.1} % less",
         advice.presses,
         advice.positions,
@@ -347,7 +348,7 @@ fn print_advice(advice: &Advice, extent: Extent) -> Result<(), Failure> {
         advice.remaining_gain_percent(),
     ))?;
     if advice.is_enough() {
-        return output::say(format!("Enough: less than {} % is left to gain.", advice.stop_percent));
+        return output::print_line(format!("Enough: less than {} % is left to gain.", advice.stop_percent));
     }
     let mut before_m = advice.error_m;
     let rows = advice.next.iter().take(SHOWN).map(|press| {
@@ -365,13 +366,13 @@ fn print_advice(advice: &Advice, extent: Extent) -> Result<(), Failure> {
         })
         .column("expected error, mm", |(press, _)| format!("{:.4}", press.error_m * 1e3))
         .column("gain, %", |(_, gain)| format!("{gain:.2}"));
-    output::say(format!("\n{table}"))?;
+    output::print_line(format!("\n{table}"))?;
     if advice.reaches_goal() {
         let count = advice.next.len();
         let words = if count == 1 { "press leaves" } else { "presses leave" };
-        output::say(format!("\n{count} {words} less than {} % to gain.", advice.stop_percent))
+        output::print_line(format!("\n{count} {words} less than {} % to gain.", advice.stop_percent))
     } else {
-        output::say(format!(
+        output::print_line(format!(
             "\nMore than {} presses are needed to leave less than {} % to gain.",
             Advice::MOST_AHEAD,
             advice.stop_percent

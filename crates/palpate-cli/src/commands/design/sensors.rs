@@ -1,8 +1,8 @@
 //! `palpate design sensors`: kinds and positions of sensors, compared with the even layout.
 
-use super::{changed_rig, design_complaint, say_files, to_micrometre, toml_position};
+use super::{changed_rig, design_complaint, print_files, to_micrometre, toml_position};
 use crate::cost::MemoryOption;
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::input;
 use crate::json::{Object, fields, object};
 use crate::output::{self, Table, figure};
@@ -10,8 +10,8 @@ use crate::progress::Observer;
 use crate::remark::remark;
 use crate::target::{Inputs, Target, TargetFolder};
 use palpate_design::sensors::{
-    Assessment, CountPoint, DesignCriterion, DesignError, Designed, Method, SensorDesign, SensorProblem,
-    Verification, best_design, enough, to_verify,
+    AssessedLayout, Assessment, CountPoint, DesignCriterion, DesignError, Method, SensorDesign,
+    SensorProblem, Verification, best_design, enough, to_verify,
 };
 use palpate_estimators::estimator::FitError;
 use palpate_estimators::evaluation::EvaluationError;
@@ -83,7 +83,7 @@ pub struct Arguments {
 struct Outcome<'a> {
     rig: &'a Path,
     problem: &'a SensorProblem<'a>,
-    designed: Vec<Designed>,
+    designed: Vec<AssessedLayout>,
     /// Errors of simulated calibrations, for some of the layouts.
     verified: Vec<(Method, Verification)>,
     counts: Vec<CountPoint>,
@@ -116,10 +116,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let (Some(target), Some(best)) = (&out, best_design(&outcome.designed)) {
         let extent = setup.surface().extent();
         let (rig, written) = changed_rig(target.path(), &text, "layout", |rig| {
-            place_sensors(rig, &best.layout, &design.kept, extent);
+            place_sensors(rig, &best.layout, &design.fixed, extent);
         })?;
         if rig.setup.layout().len() != best.layout.len() {
-            return Err(Complaint::new("the rig does not take the layout").into());
+            return Err(UserError::new("the rig does not take the layout").into());
         }
         target.write(written.as_bytes())?;
     }
@@ -127,16 +127,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         write_report(&outcome, &setup, folder)?;
     }
     if arguments.json {
-        return output::say_json(&to_json(&outcome));
+        return output::print_json(&to_json(&outcome));
     }
     print(&outcome)?;
-    say_files(arguments.out.as_deref(), arguments.report.as_deref())
+    print_files(arguments.out.as_deref(), arguments.report.as_deref())
 }
 
 fn what_to_design(arguments: &Arguments, rig: &Rig) -> Result<(Setup, SensorDesign), Failure> {
     let force_n = arguments.force.or(rig.setup.force_n());
     let setup = rig.setup.clone().with_force(force_n);
-    let setup = setup.map_err(|error| Complaint::about(&arguments.rig, error))?;
+    let setup = setup.map_err(|error| UserError::for_path(&arguments.rig, error))?;
     let mut design = match &rig.design {
         Some(design) => design.clone(),
         None => SensorDesign::for_setup(&rig.setup).map_err(|error| complaint(&error, &arguments.rig))?,
@@ -150,7 +150,7 @@ fn what_to_design(arguments: &Arguments, rig: &Rig) -> Result<(Setup, SensorDesi
     if let Some(count) = arguments.add {
         let adding = design.adding(usize::from(count), rig.setup.layout());
         design = adding.map_err(|error| complaint(&error, &arguments.rig))?;
-        let dead = rig.setup.layout().len() - design.kept.len();
+        let dead = rig.setup.layout().len() - design.fixed.len();
         if dead > 0 {
             remark!("palpate: {dead} existing sensors are dead, and are not kept");
         }
@@ -183,7 +183,7 @@ fn outcome<'a>(
             );
             let complain = |error: EvaluationError<FitError>| match Failure::from_error(&error) {
                 Failure::BadInput(_) => {
-                    Complaint::new(format!("{}: cannot verify: {error}", arguments.rig.display())).into()
+                    UserError::new(format!("{}: cannot verify: {error}", arguments.rig.display())).into()
                 }
                 stopped => stopped,
             };
@@ -265,10 +265,10 @@ pub fn help(error: &DesignError) -> &'static str {
 
 fn print(outcome: &Outcome) -> Result<(), Failure> {
     let (problem, design) = (outcome.problem, outcome.problem.design());
-    output::say(format!(
+    output::print_line(format!(
         "{}: {} of {} candidate sensors, {} contacts, {} N, force {}; score: {}\n",
         outcome.rig.display(),
-        match design.kept.len() {
+        match design.fixed.len() {
             0 => design.count.to_string(),
             kept => format!("{kept} kept and {} new", design.count - kept),
         },
@@ -278,24 +278,28 @@ fn print(outcome: &Outcome) -> Result<(), Failure> {
         problem.force().name(),
         score_in_words(design.criterion)
     ))?;
-    if let Some(words) = left_out_in_words(problem) {
-        output::say(words + "\n")?;
+    if let Some(words) = excluded_contacts_text(problem) {
+        output::print_line(words + "\n")?;
     }
-    output::say(designs(outcome))?;
+    output::print_line(designs(outcome))?;
     if outcome.designed.iter().any(|designed| !designed.assessment.keeps_constraints) {
-        output::say("* breaks a constraint of [design]")?;
+        output::print_line("* breaks a constraint of [design]")?;
     }
-    output::say("")?;
+    output::print_line("")?;
     for designed in &outcome.designed {
-        output::say(format!("{}: {}", designed.method.name(), problem.places_in_words(&designed.layout)))?;
+        output::print_line(format!(
+            "{}: {}",
+            designed.method.name(),
+            problem.places_in_words(&designed.layout)
+        ))?;
     }
     if let Some(best) = best_design(&outcome.designed) {
-        output::say(format!("\nBest: {}", gain(outcome, best)))?;
+        output::print_line(format!("\nBest: {}", gain(outcome, best)))?;
     }
     if outcome.counts.is_empty() { Ok(()) } else { print_counts(outcome) }
 }
 
-fn left_out_in_words(problem: &SensorProblem) -> Option<String> {
+fn excluded_contacts_text(problem: &SensorProblem) -> Option<String> {
     let places = problem.contacts_over_supports();
     let reason = "where an unknown force is unidentifiable: excluded from scores and limits";
     match places.as_slice() {
@@ -349,7 +353,7 @@ fn designs(outcome: &Outcome) -> String {
     table.to_string()
 }
 
-fn gain(outcome: &Outcome, best: &Designed) -> String {
+fn gain(outcome: &Outcome, best: &AssessedLayout) -> String {
     let name = best.method.name();
     let (even, reference) = match outcome.problem.reference(&outcome.designed) {
         Some(reference) => (Some(reference), reference.method.reference_in_words()),
@@ -390,9 +394,11 @@ fn print_counts(outcome: &Outcome) -> Result<(), Failure> {
         .column("mean limit, mm", |point| mm(point.designed.mean_limit_m))
         .column("largest, mm", |point| mm(point.designed.worst_limit_m))
         .column("within, %", |point| format!("{:.1}", point.designed.within_tolerance_percent));
-    output::say(format!("\n{table}"))?;
+    output::print_line(format!("\n{table}"))?;
     match enough(&outcome.counts) {
-        Some(count) => output::say(format!("\n{count} sensors come within 10 % of the score of the most.")),
+        Some(count) => {
+            output::print_line(format!("\n{count} sensors come within 10 % of the score of the most."))
+        }
         None => Ok(()),
     }
 }
@@ -421,7 +427,7 @@ fn to_json(outcome: &Outcome) -> impl Serialize {
             "x_mm": sensor.position.x_m * 1e3,
             "y_mm": sensor.position.y_m * 1e3,
             // True for an existing sensor that is kept.
-            "kept"?: (!design.kept.is_empty()).then(|| problem.is_kept(sensor)),
+            "kept"?: (!design.fixed.is_empty()).then(|| problem.is_kept(sensor)),
         }
     };
     let simulated = |verification: &Verification| {
@@ -432,7 +438,7 @@ fn to_json(outcome: &Outcome) -> impl Serialize {
             "calibrations": verification.calibrations,
         }
     };
-    let designed = |designed: &Designed| {
+    let designed = |designed: &AssessedLayout| {
         object! {
             "method": designed.method,
             "positions": designed.layout.sensors().iter().map(position).collect::<Vec<_>>(),

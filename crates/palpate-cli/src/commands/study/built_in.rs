@@ -1,7 +1,7 @@
 //! Built-in studies besides the paper's.
 
 use super::{Arguments, EarlierRun};
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::input;
 use crate::output::{self, Table};
 use crate::progress::Observer;
@@ -33,13 +33,13 @@ pub fn dead_areas(arguments: &Arguments) -> Result<(), Failure> {
         counts: dead_areas::COUNTS.to_vec(),
         calibrations: arguments.seeds.unwrap_or(CALIBRATIONS),
         tolerance_m: 2e-3,
-        without: Vec::new(),
+        excluded: Vec::new(),
         seed: 0,
     };
     let out = folder(arguments, "dead-areas")?;
     let results = |findings| results("dead-areas", study.calibrations, study.seed, findings);
     let results = results(fit(study.most_rounds(), |watch| study.run(watch))?);
-    write((arguments, &out), &results, dead_areas_report(&study, &results.findings), tell_dead_areas)
+    write((arguments, &out), &results, dead_areas_report(&study, &results.findings), dead_areas_text)
 }
 
 /// `palpate study elliott`: components of a plate's readings and a network, compared with influence
@@ -56,18 +56,18 @@ pub fn elliott(arguments: &Arguments) -> Result<(), Failure> {
     let out = folder(arguments, "elliott")?;
     let results = |findings| results("elliott", study.calibrations, study.seed, findings);
     let results = results(fit(study.most_rounds(), |watch| study.run(watch))?);
-    write((arguments, &out), &results, elliott_report(&study, &results.findings), tell_elliott)
+    write((arguments, &out), &results, elliott_report(&study, &results.findings), elliott_text)
 }
 
 fn folder(arguments: &Arguments, study: &str) -> Result<TargetFolder, Failure> {
     let in_shards = [(arguments.shard.is_some(), "--shard"), (!arguments.merge.is_empty(), "--merge")];
     if let Some((_, option)) = in_shards.into_iter().find(|(asked, _)| *asked) {
-        let complaint = Complaint::new(format!("{option}: the study `{study}` is not run in shards"));
+        let complaint = UserError::new(format!("{option}: the study `{study}` is not run in shards"));
         return Err(complaint.help("run it whole: it takes minutes").into());
     }
     if arguments.earlier_run() == EarlierRun::Resume {
         let complaint =
-            Complaint::new(format!("--resume: the study `{study}` keeps no networks to continue from"));
+            UserError::new(format!("--resume: the study `{study}` keeps no networks to continue from"));
         return Err(complaint.help("--overwrite deletes an earlier run, --out names another folder").into());
     }
     arguments.folder(study)
@@ -94,13 +94,13 @@ fn write<F: serde::Serialize>(
     out.write_report(report)?;
     out.write(RESULTS_JSON, (output::to_json(results)? + "\n").as_bytes())?;
     if arguments.json {
-        return output::say_json(results);
+        return output::print_json(results);
     }
-    output::say(tell(&results.findings))?;
-    output::say_report("\n", Some(out.path()))
+    output::print_line(tell(&results.findings))?;
+    output::print_report_path("\n", Some(out.path()))
 }
 
-fn tell_dead_areas(findings: &DeadAreaResults) -> String {
+fn dead_areas_text(findings: &DeadAreaResults) -> String {
     let mut told = Table::from_rows(&findings.rows)
         .column("sensing", |row| row.sensing.clone())
         .column("estimator", |row| row.estimator.to_owned())
@@ -110,13 +110,13 @@ fn tell_dead_areas(findings: &DeadAreaResults) -> String {
         .column("between, mm", |row| format!("{:.3}", row.folded.between_m * 1e3))
         .column("dead between, %", |row| format!("{:.1}", row.folded.dead_percent))
         .to_string();
-    for (sensing, estimator, sensors, why) in &findings.left_out {
+    for (sensing, estimator, sensors, why) in &findings.omitted {
         told += &format!("\n{sensing}, {estimator}, {sensors} sensors: skipped: {why}");
     }
     told
 }
 
-fn tell_elliott(findings: &ElliottResults) -> String {
+fn elliott_text(findings: &ElliottResults) -> String {
     let mm = |spread: Quantiles| format!("{:.3}", spread.median * 1e3);
     Table::from_rows(&findings.rows)
         .column("chain", |row| row.chain.to_string())

@@ -2,14 +2,14 @@
 //!
 //! The tables grow with every finished fit, survive Ctrl-C, and are sorted at the end.
 
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use crate::remark::remark;
 use crate::target::{EVALUATIONS_CSV, NETWORKS_CSV, RESULTS_JSON, SHARD_JSON, TargetFolder};
 use crate::{input, progress, target};
 use indicatif::ProgressBar;
 use palpate_mechanics::units::format_count;
 use palpate_studies::{
-    Checkpoint, CheckpointError, FitRows, PreparedStudy, RunOptions, StudyTables, Task, Trained,
+    ArmFit, Checkpoint, CheckpointError, FitRows, PreparedStudy, RunOptions, StudyTables, Task,
 };
 use std::fs::File;
 use std::io::Write;
@@ -25,7 +25,7 @@ pub struct FitFiles {
 
 impl FitFiles {
     /// Starts the tables with the fits of an earlier run. The run is unfinished until its end.
-    pub fn begin(out: &TargetFolder, tables: &StudyTables, done: &[Trained]) -> Result<Self, Failure> {
+    pub fn begin(out: &TargetFolder, tables: &StudyTables, done: &[ArmFit]) -> Result<Self, Failure> {
         out.remove(RESULTS_JSON)?;
         out.remove(SHARD_JSON)?;
         write(out, &tables.whole(done))?;
@@ -68,7 +68,7 @@ pub fn read(out: &TargetFolder, tables: &StudyTables) -> Result<Checkpoint, Fail
     let texts = read_texts(out.path())?;
     let checkpoint = tables.read(&texts).map_err(|error| {
         let name = out.path().join(error.table().file_name()).display().to_string();
-        let complaint = Complaint::new(format!("{name}: {error}"));
+        let complaint = UserError::new(format!("{name}: {error}"));
         match &error {
             CheckpointError::Heading { .. } => {
                 complaint.help("--overwrite starts again, --out names another folder")
@@ -89,7 +89,7 @@ pub fn read(out: &TargetFolder, tables: &StudyTables) -> Result<Checkpoint, Fail
     Ok(checkpoint)
 }
 
-pub fn at_row(complaint: Complaint, name: &str, texts: &FitRows, error: &CheckpointError) -> Complaint {
+pub fn at_row(complaint: UserError, name: &str, texts: &FitRows, error: &CheckpointError) -> UserError {
     let CheckpointError::Row { table, line, .. } = error else { return complaint };
     let text = table.text(texts);
     let row = text.lines().nth(line - 1).unwrap_or_default();
@@ -97,7 +97,7 @@ pub fn at_row(complaint: Complaint, name: &str, texts: &FitRows, error: &Checkpo
 }
 
 /// Reports surplus fits of an earlier run, which the results exclude.
-pub fn say_surplus(earlier: &[Trained], options: RunOptions) {
+pub fn print_surplus(earlier: &[ArmFit], options: RunOptions) {
     let surplus = earlier.iter().filter(|trained| trained.fit.seed >= options.seeds).count();
     if surplus > 0 {
         remark!(
@@ -137,7 +137,7 @@ impl<'a> Tally<'a> {
         prepared: &'a PreparedStudy,
         tables: &'a StudyTables<'a>,
         files: FitFiles,
-        (tasks, done): (&[Task], &[Trained]),
+        (tasks, done): (&[Task], &[ArmFit]),
     ) -> Self {
         let arm = |arm| ArmTally { patterns: prepared.patterns(arm) as f64, ..ArmTally::default() };
         let mut arms: Vec<ArmTally> = (0..prepared.study.arms.len()).map(arm).collect();
@@ -148,7 +148,7 @@ impl<'a> Tally<'a> {
             }
         }
         let bar = progress::bar(tasks.iter().map(Task::fits).sum(), "fitting");
-        let is_wanted = |trained: &&Trained| {
+        let is_wanted = |trained: &&ArmFit| {
             let name = &prepared.study.arms[trained.arm].name;
             tasks.iter().any(|task| task.arm == *name && task.seeds.contains(&trained.fit.seed))
         };
@@ -160,7 +160,7 @@ impl<'a> Tally<'a> {
         Self { prepared, tables, bar, start: Instant::now(), state }
     }
 
-    pub fn note(&self, trained: &Trained) {
+    pub fn note(&self, trained: &ArmFit) {
         let rows = self.tables.rows(trained);
         let presented = self.prepared.presentations(trained);
         let mut state = self.state();
@@ -184,7 +184,7 @@ impl<'a> Tally<'a> {
         self.bar.finish_and_clear();
         let mut state = self.state();
         match state.error.take() {
-            Some(error) => Err(Complaint::new(format!("cannot write the study's tables: {error}")).into()),
+            Some(error) => Err(UserError::new(format!("cannot write the study's tables: {error}")).into()),
             None => Ok(state.arms.iter().map(|arm| arm.finished as u64).sum()),
         }
     }

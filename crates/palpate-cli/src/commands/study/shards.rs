@@ -1,8 +1,8 @@
 //! Shards of a study: the end of one, and the merge of all into the files of a single machine.
 
 use super::fits;
-use super::{Arguments, Asked, time_in_words};
-use crate::failure::{Complaint, Failure};
+use super::{Arguments, StudyRequest, time_in_words};
+use crate::failure::{Failure, UserError};
 use crate::target::{NETWORKS_CSV, SHARD_JSON, TargetFolder};
 use crate::{input, output};
 use palpate_mechanics::units::format_count;
@@ -28,9 +28,9 @@ pub fn finish(
     let file = ShardFile { shard: shard.number(), of: shard.of(), fits, run };
     out.write(SHARD_JSON, (output::to_json(&file)? + "\n").as_bytes())?;
     if arguments.json {
-        return output::say_json(&file);
+        return output::print_json(&file);
     }
-    output::say(format!(
+    output::print_line(format!(
         "Shard {shard} of {} seeds: {} fits in {}{}",
         file.run.seeds,
         format_count(fits as u64),
@@ -40,14 +40,14 @@ pub fn finish(
 }
 
 /// `palpate study FILE --merge DIR…`
-pub fn merge(asked: &Asked, study: Study) -> Result<(), Failure> {
+pub fn merge(asked: &StudyRequest, study: Study) -> Result<(), Failure> {
     let folders = &asked.arguments.merge;
     let out = asked.arguments.folder(&study.name)?;
     let shards = folders.iter().map(|folder| read_tables(folder)).collect::<Result<Vec<_>, _>>()?;
     let prepared = asked.prepare(study)?;
     let merged = prepared.merge(&shards).map_err(|error| complaint(&error, &shards))?;
     let facts = folders.iter().map(|folder| read_facts(folder)).collect::<Result<Vec<_>, _>>()?;
-    let facts = RunFacts::of_shards(&facts).ok_or_else(|| Complaint::new(AssemblyError::Nothing))?;
+    let facts = RunFacts::of_shards(&facts).ok_or_else(|| UserError::new(AssemblyError::Nothing))?;
     let facts = RunFacts { seeds: merged.seeds, ..facts };
     fits::write(&out, &StudyTables::new(&prepared).whole(&merged.fits))?;
     out.remove(SHARD_JSON)?;
@@ -57,7 +57,7 @@ pub fn merge(asked: &Asked, study: Study) -> Result<(), Failure> {
 fn read_tables(folder: &Path) -> Result<ShardTables, Failure> {
     let networks = folder.join(NETWORKS_CSV);
     if !networks.exists() {
-        let complaint = Complaint::new(format!("{}: {NETWORKS_CSV} is missing", folder.display()));
+        let complaint = UserError::new(format!("{}: {NETWORKS_CSV} is missing", folder.display()));
         return Err(complaint.help("--merge takes the folders that --shard K/N wrote").into());
     }
     Ok(ShardTables { place: folder.display().to_string(), texts: fits::read_texts(folder)? })
@@ -66,18 +66,18 @@ fn read_tables(folder: &Path) -> Result<ShardTables, Failure> {
 fn read_facts(folder: &Path) -> Result<RunFacts, Failure> {
     let path = folder.join(SHARD_JSON);
     if !path.exists() {
-        let complaint = Complaint::new(format!("{}: {SHARD_JSON} is missing", folder.display()));
+        let complaint = UserError::new(format!("{}: {SHARD_JSON} is missing", folder.display()));
         return Err(complaint.help("run the shard again with --resume, which writes it").into());
     }
     let file: Result<ShardFile, _> = serde_json::from_str(&input::read_text(&path)?);
     let file = file.map_err(|error| {
-        Complaint::about(&path, error).help("run the shard again with --resume, which writes it again")
+        UserError::for_path(&path, error).help("run the shard again with --resume, which writes it again")
     })?;
     Ok(file.run)
 }
 
-fn complaint(error: &AssemblyError, shards: &[ShardTables]) -> Complaint {
-    let complaint = Complaint::new(error);
+fn complaint(error: &AssemblyError, shards: &[ShardTables]) -> UserError {
+    let complaint = UserError::new(error);
     match error {
         AssemblyError::Table { place, error: row } => match row {
             CheckpointError::Heading { .. } => complaint

@@ -13,7 +13,7 @@ fn all_candidates(task: FitTask) -> Vec<Estimator> {
 }
 
 #[test]
-fn estimators_that_are_not_done_in_time_are_stopped_and_left_out() {
+fn slow_estimators_are_stopped_and_omitted() {
     let bench = paper(5e-6, 2);
     let recording = bench.simulate(0);
     // Time passes only while later estimators are fitted.
@@ -29,15 +29,15 @@ fn estimators_that_are_not_done_in_time_are_stopped_and_left_out() {
     let task = FitTask::new(&bench.setup, &recording).watch(Watch::new(&observe));
     let choice = choose(task, all_candidates(task), Some(limit)).unwrap();
     // Fits that end ahead of the first check of the watch are not stopped.
-    assert!(choice.tried.iter().any(|tried| tried.name == "influence"), "{:?}", choice.tried);
-    assert_eq!(choice.tried.len() + choice.left_out.len(), Estimator::contenders(&bench.setup).len());
+    assert!(choice.candidates.iter().any(|tried| tried.name == "influence"), "{:?}", choice.candidates);
+    assert_eq!(choice.candidates.len() + choice.omitted.len(), Estimator::contenders(&bench.setup).len());
     for kind in ["network", "network-lm", "gaussian-process"] {
-        assert!(choice.left_out.contains(&(kind, NOT_IN_TIME.to_owned())), "{kind}: {:?}", choice.left_out);
+        assert!(choice.omitted.contains(&(kind, NOT_IN_TIME.to_owned())), "{kind}: {:?}", choice.omitted);
     }
 }
 
 #[test]
-fn the_first_estimator_is_stopped_too_and_nothing_is_chosen() {
+fn first_estimator_stops_too_without_a_choice() {
     let bench = paper(5e-6, 2);
     let recording = bench.simulate(0);
     // Each call of the clock is a second.
@@ -100,9 +100,9 @@ fn influence_chooses_its_structure_at_held_out_places() {
     let task = FitTask::new(&setup, &recording);
     let candidates = Estimator::Influence(Influence::default()).candidates(task).unwrap();
     let choice = choose(task, candidates, None).unwrap();
-    assert_eq!(choice.tried.len(), Structure::STATED.len(), "{choice:?}");
-    assert_eq!(choice.tried[3].name, "influence force-linear", "{choice:?}");
-    assert_eq!(choice.best.name(), choice.tried[0].name);
+    assert_eq!(choice.candidates.len(), Structure::STATED.len(), "{choice:?}");
+    assert_eq!(choice.candidates[3].name, "influence force-linear", "{choice:?}");
+    assert_eq!(choice.best.name(), choice.candidates[0].name);
 }
 
 #[test]
@@ -112,7 +112,7 @@ fn the_simplest_structure_that_is_not_significantly_worse_is_chosen() {
         let located = (0..40).map(|i| {
             let truth = Position::along(1e-3 * i as f64);
             let error_m = 1e-3 * errors_mm(i);
-            Located {
+            EvaluatedContact {
                 truth,
                 force_n: None,
                 estimate: Position::along(truth.x_m + error_m),
@@ -124,7 +124,7 @@ fn the_simplest_structure_that_is_not_significantly_worse_is_chosen() {
         });
         let evaluation = Evaluation { extent: Extent::line(0.1).unwrap(), located: located.collect() };
         let tried = figures(estimator.name(), &evaluation).unwrap();
-        Trial { estimator, tried, evaluation }
+        Trial { estimator, errors: tried, evaluation }
     };
     let scattered = |i: usize| if i.is_multiple_of(2) { 1.0 } else { 2.0 };
     let other_places = |i: usize| if i.is_multiple_of(2) { 2.0 } else { 1.1 };

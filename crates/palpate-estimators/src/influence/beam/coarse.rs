@@ -7,7 +7,7 @@
 use super::table::InfluenceTable;
 use crate::influence::config::ForceBelief;
 use crate::status::LINE_PLACES;
-use palpate_numerics::simd::{Abreast, Eight, Number};
+use palpate_numerics::simd::{EightLanes, Number, RowLanes};
 
 /// χ² is smooth between these nodes.
 pub(super) const STRIDE: usize = 4;
@@ -39,7 +39,7 @@ impl Profile {
     }
 
     #[inline(always)]
-    pub fn valleys<V: Eight>(&self) -> ([usize; MOST_MINIMA], usize) {
+    pub fn valleys<V: EightLanes>(&self) -> ([usize; MOST_MINIMA], usize) {
         let (left, here, right) =
             (self.misfits.as_chunks().0, self.misfits[1..].as_chunks().0, self.misfits[2..].as_chunks().0);
         let mut bits = 0u64;
@@ -136,7 +136,7 @@ impl Coarse {
 
     /// Computes χ² at the best force; `square` is |d|².
     #[inline(always)]
-    pub fn scan<V: Eight>(&self, square: f64, whitened: &[[f64; 8]], profile: &mut Profile) {
+    pub fn scan<V: EightLanes>(&self, square: f64, whitened: &[[f64; 8]], profile: &mut Profile) {
         let mut products = [V::splat(0.0); BLOCKS];
         for (channels, d) in self.influences.as_chunks::<8>().0.iter().zip(whitened) {
             for i in 0..8 {
@@ -165,7 +165,7 @@ impl Coarse {
     }
 
     #[inline(always)]
-    pub fn start<V: Eight, N: Abreast<V>>(
+    pub fn start<V: EightLanes, N: RowLanes<V>>(
         &self,
         profiles: &N::Each<&Profile>,
         nodes: &N::Each<usize>,
@@ -283,7 +283,7 @@ struct Mixture<N> {
 
 impl Mixture<f64> {
     #[inline(always)]
-    pub fn abreast<V: Copy, N: Abreast<V>>(each: &N::Each<Self>) -> Mixture<N> {
+    pub fn abreast<V: Copy, N: RowLanes<V>>(each: &N::Each<Self>) -> Mixture<N> {
         let of = |part: fn(&Self) -> f64| {
             let mut lanes = N::each(0.0);
             lanes.as_mut().iter_mut().zip(each.as_ref()).for_each(|(lane, mixtures)| *lane = part(mixtures));

@@ -10,7 +10,7 @@
 
 use super::table::{Cell, InfluenceTable, Spacing};
 use crate::influence::config::ForceBelief;
-use palpate_numerics::simd::{Abreast, Eight, Number};
+use palpate_numerics::simd::{EightLanes, Number, RowLanes};
 use palpate_numerics::small::add_outer;
 
 #[derive(Clone, Debug, PartialEq)]
@@ -89,7 +89,7 @@ impl GaussNewton {
 
     /// Returns the minima near `start`, and a bit for each converged reading.
     #[inline(always)]
-    pub fn minimum<V: Eight, N: Abreast<V>>(
+    pub fn minimum<V: EightLanes, N: RowLanes<V>>(
         &self,
         whitened: &[[f64; 8]],
         start: (N, N),
@@ -130,7 +130,7 @@ impl GaussNewton {
     }
 
     #[inline(always)]
-    fn curvature<V: Eight, N: Abreast<V>>(&self, node: N) -> Curvature<N> {
+    fn curvature<V: EightLanes, N: RowLanes<V>>(&self, node: N) -> Curvature<N> {
         let (mut kappa_square, mut lambda_square) = (N::each(0.0), N::each(0.0));
         let curvatures = kappa_square.as_mut().iter_mut().zip(lambda_square.as_mut());
         for ((kappa_square, lambda_square), node) in curvatures.zip(node.lanes().as_ref()) {
@@ -157,7 +157,12 @@ impl GaussNewton {
     }
 
     #[inline(always)]
-    fn sums<V: Eight, N: Abreast<V>>(&self, whitened: &[[f64; 8]], cell: Cell<N>, force_n: N) -> Sums<N> {
+    fn sums<V: EightLanes, N: RowLanes<V>>(
+        &self,
+        whitened: &[[f64; 8]],
+        cell: Cell<N>,
+        force_n: N,
+    ) -> Sums<N> {
         let points = Points::new::<V, N>(cell, force_n);
         if let ForceBelief::Known(_) = self.force {
             let mut vectors = N::each([V::splat(0.0); 3]);
@@ -180,7 +185,12 @@ impl GaussNewton {
 
     /// Sums of e², g², eg, f², fg and ef; `grown` multiplies the calibration's variance.
     #[inline(always)]
-    fn sums_by_channel<V: Eight>(&self, whitened: &[[f64; 8]], place: &Point, grown: Option<f64>) -> [V; 6] {
+    fn sums_by_channel<V: EightLanes>(
+        &self,
+        whitened: &[[f64; 8]],
+        place: &Point,
+        grown: Option<f64>,
+    ) -> [V; 6] {
         let [mut square, mut gg, mut eg, mut ff, mut fg, mut ef] = [V::splat(0.0); 6];
         let Point { reading, cell, force_n } = place;
         let (groups, force, node) = (self.groups, V::splat(*force_n), cell.node as u32 as usize);
@@ -265,7 +275,7 @@ struct Points<L> {
 
 impl<L: AsRef<[f64]>> Points<L> {
     #[inline(always)]
-    fn new<V: Copy, N: Abreast<V, Each<f64> = L>>(cell: Cell<N>, force_n: N) -> Self {
+    fn new<V: Copy, N: RowLanes<V, Each<f64> = L>>(cell: Cell<N>, force_n: N) -> Self {
         let ([v0, v1, v2, v3], [s0, s1, s2, s3]) = (cell.value, cell.slope);
         let cell = Cell {
             node: cell.node.lanes(),
@@ -289,20 +299,24 @@ impl<L: AsRef<[f64]>> Points<L> {
 }
 
 #[inline(always)]
-pub(super) fn interpolate<V: Eight>(cell: &Cell<f64>, left: &[[f64; 8]; 2], right: &[[f64; 8]; 2]) -> (V, V) {
+pub(super) fn interpolate<V: EightLanes>(
+    cell: &Cell<f64>,
+    left: &[[f64; 8]; 2],
+    right: &[[f64; 8]; 2],
+) -> (V, V) {
     let at = [V::load(&left[0]), V::load(&right[0]), V::load(&left[1]), V::load(&right[1])];
     (mix(&cell.value, &at), mix(&cell.slope, &at))
 }
 
 #[inline(always)]
-fn mix<V: Eight>(weights: &[f64; 4], at: &[V; 4]) -> V {
+fn mix<V: EightLanes>(weights: &[f64; 4], at: &[V; 4]) -> V {
     let values = V::splat(weights[0]) * at[0] + V::splat(weights[1]) * at[1];
     values + (V::splat(weights[2]) * at[2] + V::splat(weights[3]) * at[3])
 }
 
 /// 1/(1 + g·v) from w = 1/(1 + v).
 #[inline(always)]
-fn grow<V: Eight>(weight: V, grown: V) -> V {
+fn grow<V: EightLanes>(weight: V, grown: V) -> V {
     weight / (weight + grown * (V::splat(1.0) - weight))
 }
 

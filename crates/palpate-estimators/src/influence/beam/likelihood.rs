@@ -116,7 +116,7 @@ impl Likelihood for BeamLikelihood {
         whitened.truncate(search.live.len());
     }
 
-    fn fit_nothing(&self, whitened: &[f64], mode_n: f64) -> ContactFit<1> {
+    fn fit_untouched(&self, whitened: &[f64], mode_n: f64) -> ContactFit<1> {
         self.fit(whitened, [], Some(mode_n))
     }
 

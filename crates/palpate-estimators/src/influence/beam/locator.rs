@@ -17,7 +17,7 @@ use crate::setup::Setup;
 use crate::status::{FalseAlarmRate, NO_CONTACT};
 use palpate_core::{Estimate, Status};
 use palpate_mechanics::contact::Position;
-use palpate_numerics::simd::{Array, Eight, InstructionSet, Kernel, Simd};
+use palpate_numerics::simd::{Array, EightLanes, InstructionSet, Kernel, Simd};
 use serde::{Deserialize, Serialize};
 
 /// Locator that inverts the influence functions of a line.
@@ -186,7 +186,12 @@ impl Kernel for LocateRows<'_> {
 }
 
 #[inline(always)]
-fn locate_each<V: Eight>(search: &Search, rows: Rows, scratch: &mut Scratch, estimates: &mut [Estimate]) {
+fn locate_each<V: EightLanes>(
+    search: &Search,
+    rows: Rows,
+    scratch: &mut Scratch,
+    estimates: &mut [Estimate],
+) {
     let channels = rows.channels.max(1);
     let count = estimates.len().min(rows.readings.len() / channels);
     let eights = count - count % 8;
@@ -201,7 +206,12 @@ fn locate_each<V: Eight>(search: &Search, rows: Rows, scratch: &mut Scratch, est
 }
 
 #[inline(always)]
-fn locate_eight<V: Eight>(search: &Search, rows: Rows, scratch: &mut Scratch, estimates: &mut [Estimate; 8]) {
+fn locate_eight<V: EightLanes>(
+    search: &Search,
+    rows: Rows,
+    scratch: &mut Scratch,
+    estimates: &mut [Estimate; 8],
+) {
     let groups = search.groups();
     scratch.eight.resize(groups);
     let ForEight { whitened, profiles } = &mut scratch.eight;
@@ -236,7 +246,7 @@ fn locate_eight<V: Eight>(search: &Search, rows: Rows, scratch: &mut Scratch, es
 }
 
 #[inline(always)]
-fn one_by_one<V: Eight>(minima: &Minimum<V>) -> [Minimum; 8] {
+fn one_by_one<V: EightLanes>(minima: &Minimum<V>) -> [Minimum; 8] {
     let [xx, xf, ff] = minima.covariance;
     let (xx, xf, ff) = (xx.to_array(), xf.to_array(), ff.to_array());
     let x_m = minima.x_m.to_array();
@@ -251,7 +261,12 @@ fn one_by_one<V: Eight>(minima: &Minimum<V>) -> [Minimum; 8] {
 
 /// Writes only those parts of a reused estimate that are read.
 #[inline(always)]
-fn locate_into<V: Eight>(search: &Search, reading: &[f64], scratch: &mut Scratch, estimate: &mut Estimate) {
+fn locate_into<V: EightLanes>(
+    search: &Search,
+    reading: &[f64],
+    scratch: &mut Scratch,
+    estimate: &mut Estimate,
+) {
     let square = search.whiten::<V>(reading, scratch.whitened.room(search.groups()));
     let (minima, count) = search.minima::<V>(square, scratch);
     let read = Read { whitened: scratch.whitened.groups(search.groups()), square };

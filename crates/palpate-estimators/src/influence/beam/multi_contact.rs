@@ -8,7 +8,7 @@ use super::coarse::{COARSE, STRIDE};
 use super::search::Search;
 use super::table::InfluenceTable;
 use crate::likelihood::ContactFit;
-use crate::status::{LINE_PLACES, contact_cost, misfit_bound};
+use crate::status::{LINE_PLACES, chi_squared_bound, contact_cost};
 use ndarray::Array2;
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 use palpate_mechanics::contact::{Contact, Position};
@@ -44,7 +44,7 @@ pub(super) fn locate_several(
     for contact in further {
         estimate.further.push(*contact);
     }
-    if together.misfit > misfit_bound(channels - 2 * together.contacts.len()) {
+    if together.misfit > chi_squared_bound(channels - 2 * together.contacts.len()) {
         estimate.status = Status::OutsideModel;
     }
     Some(estimate)

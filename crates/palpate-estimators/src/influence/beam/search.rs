@@ -10,7 +10,7 @@ use super::table::InfluenceTable;
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
 use crate::status::{LINE_PLACES, StatusRule, unknowns};
-use palpate_numerics::simd::Eight;
+use palpate_numerics::simd::EightLanes;
 
 /// Whitened table of the channels in use.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,7 +61,7 @@ impl Search {
 
     /// Writes d and returns |d|².
     #[inline(always)]
-    pub fn whiten<V: Eight>(&self, reading: &[f64], whitened: &mut [[f64; 8]]) -> f64 {
+    pub fn whiten<V: EightLanes>(&self, reading: &[f64], whitened: &mut [[f64; 8]]) -> f64 {
         let mut square = V::splat(0.0);
         for (g, (group, [offsets, inverse])) in whitened.iter_mut().zip(&self.scaling).enumerate() {
             let channels = &self.live[8 * g..self.live.len().min(8 * g + 8)];
@@ -82,7 +82,7 @@ impl Search {
 
     /// Lowest local minimum, and a lower bound of χ² of the others.
     #[inline(always)]
-    pub fn lowest_valley<V: Eight>(
+    pub fn lowest_valley<V: EightLanes>(
         &self,
         square: f64,
         whitened: &[[f64; 8]],
@@ -116,7 +116,11 @@ impl Search {
 
     /// Relevant minima, best first; `square` is |d|².
     #[inline(always)]
-    pub fn minima<V: Eight>(&self, square: f64, scratch: &mut Scratch) -> ([Minimum; MOST_MINIMA], usize) {
+    pub fn minima<V: EightLanes>(
+        &self,
+        square: f64,
+        scratch: &mut Scratch,
+    ) -> ([Minimum; MOST_MINIMA], usize) {
         let whitened = scratch.whitened.groups(self.groups());
         self.coarse.scan::<V>(square, whitened, &mut scratch.profile);
         let (valleys, valleys_count) = scratch.profile.valleys::<V>();

@@ -1,10 +1,10 @@
-//! Directions of the distributed-contact test about every place of a line; see [`crate::spread`].
+//! Directions of the distributed-contact test about every place of a line; see [`crate::distributed_contact`].
 
 use super::gauss_newton::{GaussNewton, Minimum, grouped, interpolate};
 use super::table::InfluenceTable;
+use crate::distributed_contact::{BoundedContact, DistributedContactDirections, distributed_contact_bound};
 use crate::influence::config::ForceBelief;
-use crate::spread::{About, SpreadDirections, spread_bound};
-use palpate_numerics::simd::{Arithmetic, Array, Eight, Vector};
+use palpate_numerics::simd::{Arithmetic, Array, EightLanes, Vector};
 
 type Group = Array<f64, 8, false>;
 
@@ -26,9 +26,11 @@ impl SpreadTable {
             let middle_m = (cell as f64 + 0.5) * table.spacing_m();
             let weights = &gauss_newton.weights[cell * gauss_newton.groups..][..gauss_newton.groups];
             let weights = &weights.as_flattened()[..table.sensors];
-            let about =
-                About { at: [middle_m, 0.0, 1.0], ends: [(0.0, table.length_m), (0.0, 0.0), force_ends] };
-            let directions = SpreadDirections::about(about, |[x_m, _, force_n]| {
+            let about = BoundedContact {
+                at: [middle_m, 0.0, 1.0],
+                ends: [(0.0, table.length_m), (0.0, 0.0), force_ends],
+            };
+            let directions = DistributedContactDirections::at_contact(about, |[x_m, _, force_n]| {
                 let mut reads = vec![0.0; table.sensors];
                 table.for_each(table.cell(x_m), |s, f, _| reads[s] = weights[s].sqrt() * force_n * f);
                 reads
@@ -38,7 +40,7 @@ impl SpreadTable {
             let weighted: Vec<f64> = unit.iter().zip(weights).map(|(u, w)| u * w.sqrt()).collect();
             units.extend(grouped(&weighted, table.sensors, 0.0));
         }
-        Self { units, calibrated, bound: spread_bound(1) }
+        Self { units, calibrated, bound: distributed_contact_bound(1) }
     }
 
     #[inline]

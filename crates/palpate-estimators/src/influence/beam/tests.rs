@@ -46,7 +46,7 @@ fn limit_m(setup: &Setup, x_m: f64, force_known: bool) -> f64 {
     let here = clean(setup, &[(x_m, force_n)]);
     let (mut aa, mut af, mut ff) = (0.0, 0.0, 0.0);
     for (s, sensor) in setup.layout().sensors().iter().enumerate() {
-        let (noise, dead) = (sensor.channel.noise_sd, sensor.channel.dead);
+        let (noise, dead) = (sensor.channel.noise_sd, sensor.channel.disabled);
         let (g, f) = ((right[s] - left[s]) / (2.0 * h * noise), here[s] / (force_n * noise));
         if !dead {
             (aa, af, ff) = (aa + g * g, af + g * f, ff + f * f);
@@ -104,7 +104,7 @@ fn ratio_and_coverage(source: InfluenceSource, force_known: bool, faults: Faults
         let mut locator = fit(Influence { source, ..Influence::default() }, &setup, &recording);
         if let Some(channel) = faults.dead {
             assert!(locator.leave_out(channel));
-            rig.setup.set_dead(channel, true);
+            rig.setup.set_disabled(channel, true);
         }
         for mm in (5..=395).step_by(3) {
             let x_m = f64::from(mm) / 1e3;
@@ -284,7 +284,7 @@ fn presses_that_say_too_little_are_refused() {
 #[test]
 fn influences_at_the_nodes_leave_out_dead_channels() {
     let mut bench = paper(5e-6, 3);
-    bench.setup.edit_sensors(|sensors| sensors[2].channel.dead = true).unwrap();
+    bench.setup.edit_sensors(|sensors| sensors[2].channel.disabled = true).unwrap();
     let locator = fit(Influence::default(), &bench.setup, &bench.simulate(1));
     let learnt = locator.influences_at_nodes();
     assert_eq!(learnt.channels, [0, 1, 3, 4, 5, 6, 7]);

@@ -11,7 +11,7 @@ use crate::influence::grid::Axis;
 use crate::status::OTHER_PLACE;
 use crate::trade_off::{CALIBRATED, Contacts, Force, NotExcluded};
 use palpate_core::{ContactEstimate, Estimate};
-use palpate_numerics::{NORMAL_95, NORMAL_99, holding, hull, normal_interval_95};
+use palpate_numerics::{NORMAL_95, NORMAL_99, extend_to, hull, normal_interval_95};
 use std::cell::RefCell;
 
 impl ForceLinearLocator {
@@ -65,7 +65,7 @@ impl ForceLinearLocator {
         else {
             return;
         };
-        uncertainty.x_95_m = holding(hull(x_95_m, uncertainty.x_95_m), position.x_m);
+        uncertainty.x_95_m = extend_to(hull(x_95_m, uncertainty.x_95_m), position.x_m);
         if let (Some(force_95_n), Some(force_n)) = (force_95_n, *force_n) {
             let (least_n, most_n) = normal_interval_95(force_n, uncertainty.covariance[5].sqrt());
             uncertainty.force_95_n = Some(hull(force_95_n, (least_n.max(0.0), most_n)));

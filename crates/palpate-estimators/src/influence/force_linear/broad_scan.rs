@@ -7,7 +7,7 @@
 use crate::force_prior::LogNormalPrior;
 use crate::influence::inversion::CellBlocks;
 use crate::influence::lanes::{LANES, Lanes};
-use palpate_numerics::simd::Eight;
+use palpate_numerics::simd::EightLanes;
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct BroadScan {
@@ -59,7 +59,7 @@ struct Sums<V> {
     ff: V,
 }
 
-impl<V: Eight> Sums<V> {
+impl<V: EightLanes> Sums<V> {
     /// Least-squares φ.
     ///
     /// Not a closure: closures are not compiled for the instructions of the caller.
@@ -100,7 +100,7 @@ impl BroadScan {
     }
 
     #[inline(always)] // Compiled for the instructions of its caller.
-    fn sums<V: Eight>(&self, block: usize, reading: &[f64], response: V) -> Sums<V> {
+    fn sums<V: EightLanes>(&self, block: usize, reading: &[f64], response: V) -> Sums<V> {
         let zero = V::splat(0.0);
         let mut sums = Sums { dd: zero, fd: zero, ff: V::splat(f64::MIN_POSITIVE) };
         for (terms, d) in self.terms[block * self.channels..(block + 1) * self.channels].iter().zip(reading) {
@@ -123,7 +123,7 @@ impl CellBlocks for BroadScan {
     }
 
     #[inline(always)]
-    fn look<V: Eight>(&self, block: usize, reading: &[f64]) -> [V; 3] {
+    fn look<V: EightLanes>(&self, block: usize, reading: &[f64]) -> [V; 3] {
         let (_, greatest_n) = self.prior.ends_n();
         let (zero, greatest) = (V::splat(0.0), V::splat(greatest_n));
         let by_noise = self.sums(block, reading, zero).response(greatest);

@@ -7,6 +7,7 @@ use super::prior::{Prior, Source};
 use super::saturation::Saturation;
 use super::scan::Scan;
 use super::shared_errors::own_shares;
+use crate::detectable_force::DetectableForce;
 use crate::fit::{Locate, LocatorFault, NoCheck};
 use crate::force_prior::{ForcePrior, ForceRange, LogNormalPrior, NormalPrior};
 use crate::influence::at_nodes::InfluencesAtNodes;
@@ -14,7 +15,6 @@ use crate::influence::config::Structure;
 use crate::influence::grid::{Axis, check_axes, greatest_distances};
 use crate::influence::inversion::Layers;
 use crate::influence::lanes::{Lanes, in_lanes};
-use crate::lightest_touch::LightestTouch;
 use crate::recording::{LEAST_FREEDOM, Recording};
 use crate::setup::Setup;
 use crate::status::{Detection, Directions, FalseAlarmRate, NoiseBounds, unknowns};
@@ -474,7 +474,7 @@ impl ForceLinearLocator {
     }
 
     /// Smallest detectable force.
-    pub fn lightest_touch(&self) -> LightestTouch<'_> {
+    pub fn lightest_touch(&self) -> DetectableForce<'_> {
         let coordinates = if self.stored.y.count > 1 { 2 } else { 1 };
         let detection = Detection {
             channels: self.stored.live.len(),
@@ -490,7 +490,7 @@ impl ForceLinearLocator {
         };
         let noise_sds = self.noise_of_channels().into_iter().enumerate();
         let noise_sds = noise_sds.filter_map(|(channel, sd)| Some((channel, sd?))).collect();
-        LightestTouch::new(detection, self.stored.false_alarm_rate, noise_sds, Box::new(change))
+        DetectableForce::new(detection, self.stored.false_alarm_rate, noise_sds, Box::new(change))
     }
 
     /// Standard deviations of noise and offset together; `None` for channels not in use.

@@ -5,7 +5,7 @@
 
 use crate::influence::inversion::CellBlocks;
 use crate::influence::lanes::{LANES, Lanes};
-use palpate_numerics::simd::Eight;
+use palpate_numerics::simd::EightLanes;
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Scan {
@@ -68,7 +68,7 @@ impl CellBlocks for Scan {
 
     /// Least chi-squared, cost and φ of each node.
     #[inline(always)]
-    fn look<V: Eight>(&self, block: usize, reading: &[f64]) -> [V; 3] {
+    fn look<V: EightLanes>(&self, block: usize, reading: &[f64]) -> [V; 3] {
         let of_block = block * self.channels..(block + 1) * self.channels;
         let channels = self.weights[of_block.clone()].iter().zip(&self.products[of_block]).zip(reading);
         let [expected, precision] = self.expected;

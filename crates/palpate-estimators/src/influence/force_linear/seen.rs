@@ -11,6 +11,7 @@
 //! between presses would fit every reading.
 
 use super::locator::{COVARIANCES, CellScan, ForceLinearLocator, LAYERS, Stored, VALUES, VARIANCES};
+use crate::distributed_contact::{BoundedContact, distributed_contact_bound, distributed_contact_score};
 use crate::force_prior::{ForceIntegral, ForceLikelihood};
 use crate::influence::grid::Axis;
 use crate::influence::inversion::{
@@ -19,8 +20,7 @@ use crate::influence::inversion::{
 use crate::influence::lanes::{LANES, Lanes, in_lanes};
 use crate::influence::levenberg::{Equations, Unknowns};
 use crate::recording::Recording;
-use crate::spread::{About, spread_bound, spread_score};
-use crate::status::{learnt_bounds, misfit_bound};
+use crate::status::{chi_squared_bound, recording_bounds};
 use palpate_core::Estimate;
 use palpate_numerics::{SharedError, simd, with_shared_error};
 
@@ -39,8 +39,9 @@ impl ForceLinearLocator {
 
     pub(super) fn limit_residuals(&mut self, recording: &Recording) {
         let freedom = self.stored.live.len().saturating_sub(self.unknowns());
-        let normal = [misfit_bound(freedom), spread_bound(self.stored.prior.extent.dimensions())];
-        let [misfit, spread] = learnt_bounds(normal, recording, |reading| {
+        let normal =
+            [chi_squared_bound(freedom), distributed_contact_bound(self.stored.prior.extent.dimensions())];
+        let [misfit, spread] = recording_bounds(normal, recording, |reading| {
             let mut seen = Inversion::new(self.seen(&self.relative(reading)));
             [seen.misfit(), seen.spread()]
         });
@@ -298,9 +299,9 @@ impl Explain for Seen<'_> {
             whitened(&mut values.as_flattened().iter().map(|f| response_n * f))
         };
         let [x, y] = self.axes().map(|axis| (0.0, (axis.count - 1) as f64));
-        let about = About { at, ends: [x, y, self.range().unwrap_or((at[2], at[2]))] };
+        let about = BoundedContact { at, ends: [x, y, self.range().unwrap_or((at[2], at[2]))] };
         let reading = whitened(&mut self.reading.as_flattened().iter().copied());
-        spread_score(about, reading, reads)
+        distributed_contact_score(about, reading, reads)
     }
 
     /// φ by steps from `latent`, each with the last one's variances.

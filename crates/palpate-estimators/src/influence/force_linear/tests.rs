@@ -8,7 +8,7 @@ use super::prior::Prior;
 use super::{ForceLinearLocator, evidence, fit, fit_condensed, posterior};
 use crate::fit::Fit;
 use crate::fit::{FitTask, Locate};
-use crate::fixtures::Covered;
+use crate::fixtures::CoverageTally;
 use crate::influence::calibration::{Averaging, CalibrationRows};
 use crate::influence::{Influence, InfluenceFitError, InfluenceLocator, Structure};
 use crate::recording::{Recording, Row};
@@ -414,8 +414,8 @@ fn covered(
     boards: &mut [(Bench, ForceLinearLocator)],
     readings: usize,
     mut contact: impl FnMut(&mut Xoshiro256PlusPlus) -> Contact,
-) -> Covered {
-    let mut row = Covered::default();
+) -> CoverageTally {
+    let mut row = CoverageTally::default();
     let count = boards.len();
     for i in 0..readings {
         let (bench, locator) = &mut boards[i % count];

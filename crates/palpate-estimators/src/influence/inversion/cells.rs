@@ -1,7 +1,7 @@
 //! Coarse search over the cells of a grid.
 
 use crate::influence::lanes::{LANES, Lanes};
-use palpate_numerics::simd::{Eight, InstructionSet, Kernel, Simd, Vector};
+use palpate_numerics::simd::{EightLanes, InstructionSet, Kernel, Simd, Vector};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::influence) struct Cells {
@@ -88,7 +88,7 @@ pub(in crate::influence) trait CellBlocks {
     fn cells(&self) -> usize;
 
     /// χ², cost and amplitude of each cell of a block.
-    fn look<V: Eight>(&self, block: usize, reading: &[f64]) -> [V; 3];
+    fn look<V: EightLanes>(&self, block: usize, reading: &[f64]) -> [V; 3];
 }
 
 pub(in crate::influence) fn look_at_cells(

@@ -13,7 +13,7 @@ use crate::influence::moments::Moments;
 use crate::status::OTHER_PLACE;
 use palpate_core::{BoundedList, ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
-use palpate_numerics::{holding, normal_interval_95};
+use palpate_numerics::{extend_to, normal_interval_95};
 
 /// Source of the force of an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -190,8 +190,8 @@ impl Posterior {
         contact.uncertainty = all.uncertainty;
         if let Some(uncertainty) = &mut contact.uncertainty {
             let [x_95_m, y_95_m] = self.intervals_m.unwrap_or([uncertainty.x_95_m, uncertainty.y_95_m]);
-            uncertainty.x_95_m = holding(x_95_m, contact.position.x_m);
-            uncertainty.y_95_m = holding(y_95_m, contact.position.y_m);
+            uncertainty.x_95_m = extend_to(x_95_m, contact.position.x_m);
+            uncertainty.y_95_m = extend_to(y_95_m, contact.position.y_m);
         }
         contact
     }

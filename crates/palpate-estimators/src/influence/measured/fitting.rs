@@ -10,7 +10,7 @@ use crate::influence::inversion::{Layers, Stencil};
 use crate::influence::noise::{Noise, Whitening};
 use crate::recording::Recording;
 use crate::setup::Setup;
-use crate::status::{learnt_bounds, misfit_bound};
+use crate::status::{chi_squared_bound, recording_bounds};
 use crate::thinning::thinned;
 use ndarray::{Array1, Array2, s};
 use palpate_mechanics::surface::Extent;
@@ -253,7 +253,8 @@ fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
     let table = locator.table();
     let fitted = [table.x, table.y, table.nuisance].iter().filter(|axis| axis.count > 1).count();
     let freedom = locator.whitening().channels().saturating_sub(fitted).max(1);
-    let [limit] = learnt_bounds([misfit_bound(freedom)], recording, |reading| [locator.misfit(reading)]);
+    let [limit] =
+        recording_bounds([chi_squared_bound(freedom)], recording, |reading| [locator.misfit(reading)]);
     limit
 }
 

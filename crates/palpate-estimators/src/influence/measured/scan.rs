@@ -7,7 +7,7 @@ use super::table::Table;
 use crate::influence::inversion::{CellBlocks, Cells};
 use crate::influence::lanes::{LANES, Lanes};
 use crate::influence::noise::Whitening;
-use palpate_numerics::simd::Eight;
+use palpate_numerics::simd::EightLanes;
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Scan {
@@ -74,7 +74,7 @@ impl CellBlocks for Scan {
 
     /// Least squared residual of each cell, and the nuisance coordinate there.
     #[inline(always)]
-    fn look<V: Eight>(&self, block: usize, reading: &[f64]) -> [V; 3] {
+    fn look<V: EightLanes>(&self, block: usize, reading: &[f64]) -> [V; 3] {
         let (zero, one, two) = (V::splat(0.0), V::splat(1.0), V::splat(2.0));
         let mut own = zero;
         for (weights, z) in self.weights[block * self.channels..].iter().zip(reading) {
@@ -101,7 +101,7 @@ impl CellBlocks for Scan {
             let along = V::splat(0.5) * (last + way - residual);
             let s = (along * V::load(&self.per_way[at - 1])).max(zero).min(one);
             let between = last - s * (two * along - s * way);
-            latent = between.where_below(best, V::splat((node - 1) as f64) + s, latent);
+            latent = between.select_below(best, V::splat((node - 1) as f64) + s, latent);
             best = between.min(best);
             last = residual;
         }

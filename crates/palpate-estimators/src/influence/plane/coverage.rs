@@ -2,7 +2,7 @@
 //! `plate-edges`.
 
 use crate::fit::{FitTask, Locate};
-use crate::fixtures::{Covered, Example, plate};
+use crate::fixtures::{CoverageTally, Example, plate};
 use crate::influence::Influence;
 use crate::simulate::CleanSensors;
 use palpate_mechanics::contact::{Contact, Position};
@@ -49,18 +49,18 @@ impl Place {
 }
 
 /// Force intervals may cover more than 95 %: in a corner they include nearly all forces.
-fn check(row: &Covered, place: Place) {
+fn check(row: &CoverageTally, place: Place) {
     assert!(row.outside == 0 && row.greatest_n <= 10.0 * PRESSES_N, "{place:?}: {row:?}");
-    if row.found < 100 {
+    if row.detected < 100 {
         return;
     }
-    assert!(100 * row.doubted <= 2 * row.found, "{place:?}: {row:?}");
+    assert!(100 * row.outside_model <= 2 * row.detected, "{place:?}: {row:?}");
     // Four standard deviations around the 94.3–97.0 % of the experiment's rows with full detection.
-    let margin = 400.0 * (0.95 * 0.05 / row.found as f64).sqrt();
-    let [x, y, force] = [row.along, row.across, row.force].map(|count| row.percent(count));
+    let margin = 400.0 * (0.95 * 0.05 / row.detected as f64).sqrt();
+    let [x, y, force] = [row.x_covered, row.y_covered, row.force].map(|count| row.percent(count));
     let least = 95.0 - margin;
     assert!(x >= least && y >= least && force >= least, "{place:?}: {row:?}");
-    if row.found == row.readings {
+    if row.detected == row.readings {
         let most = 97.0 + 0.5 * margin;
         assert!(x <= most && y <= most, "{place:?}: {row:?}");
     }
@@ -76,7 +76,7 @@ fn intervals_hold_contacts_of_unknown_force_near_edges_and_in_corners() {
     let places = [Place::Edge(5.0), Place::Edge(20.0), Place::Edge(150.0), Place::Corner(15.0)];
     for force_n in CONTACTS_N {
         for place in places {
-            let mut row = Covered::default();
+            let mut row = CoverageTally::default();
             for locator in &locators {
                 for _ in 0..READINGS {
                     let contact = Contact { position: place.draw(&mut rng), force_n };

@@ -65,7 +65,7 @@ impl Likelihood for PlateLikelihood {
         self.search.whiten(reading, whitened);
     }
 
-    fn fit_nothing(&self, whitened: &[f64], _mode_n: f64) -> ContactFit<1> {
+    fn fit_untouched(&self, whitened: &[f64], _mode_n: f64) -> ContactFit<1> {
         ContactFit { misfit: whitened.iter().map(|d| d * d).sum(), ..ContactFit::NOTHING }
     }
 

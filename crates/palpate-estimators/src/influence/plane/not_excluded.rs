@@ -74,7 +74,7 @@ impl Search {
         estimate: Unknowns,
     ) -> NotExcluded {
         let limits = [self.size_m[0], self.size_m[1], self.greatest_force_n];
-        if self.rule.taken_beyond_cost(square, minima[0].misfit) <= faint() {
+        if self.rule.net_reduction(square, minima[0].misfit) <= faint() {
             return NotExcluded(limits.map(|limit| (0.0, limit)));
         }
         let looked: Vec<Looked> =

@@ -7,11 +7,11 @@
 use super::coarse::{Coarse, MOST_VALLEYS, Profile};
 use super::edges::Edges;
 use super::table::{Patches, PlaneTable};
+use crate::distributed_contact::{BoundedContact, distributed_contact_bound, distributed_contact_score};
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
 use crate::influence::lanes::{LANES, Lanes};
 use crate::influence::levenberg::{Equations, Unknowns, descend};
-use crate::spread::{About, spread_bound, spread_score};
 use crate::status::{StatusRule, unknowns};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_numerics::small::{Matrix, add_outer};
@@ -183,7 +183,7 @@ impl Search {
     /// Distributed-contact test.
     fn is_spread(&self, whitened: &[f64], Minimum { at, misfit, .. }: &Minimum) -> bool {
         // χ² is at least as large as the score.
-        if *misfit <= spread_bound(2) {
+        if *misfit <= distributed_contact_bound(2) {
             return false;
         }
         let [x_m, y_m, force_n] = *at;
@@ -197,9 +197,9 @@ impl Search {
             f.zip(&roots).map(|(f, root)| root * force_n * f).collect()
         };
         let force = self.force.known_n().map_or((0.0, self.greatest_force_n), |force_n| (force_n, force_n));
-        let about = About { at: *at, ends: [(0.0, self.size_m[0]), (0.0, self.size_m[1]), force] };
+        let about = BoundedContact { at: *at, ends: [(0.0, self.size_m[0]), (0.0, self.size_m[1]), force] };
         let reading = whitened.iter().zip(&roots).map(|(d, root)| root * d);
-        spread_score(about, reading, reads) > spread_bound(2)
+        distributed_contact_score(about, reading, reads) > distributed_contact_bound(2)
     }
 
     /// Approximate lower bound of χ² in a coarse cell.

@@ -28,7 +28,7 @@ const NOISE: ChannelModel = ChannelModel {
     offset_error: 0.0,
     position_error_m: 0.0,
     range: None,
-    dead: false,
+    disabled: false,
 };
 
 fn fit(config: Influence, setup: &Setup, recording: &Recording) -> PlaneLocator {

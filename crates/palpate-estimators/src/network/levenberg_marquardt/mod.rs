@@ -222,7 +222,12 @@ impl NetworkInputs {
             FeatureSource::Channel(i) => scaled[i],
             FeatureSource::LogNorm => largest,
         };
-        Some(features.iter().map(|feature| of_feature(feature.source) / norm / feature.spread).collect())
+        Some(
+            features
+                .iter()
+                .map(|feature| of_feature(feature.source) / norm / feature.standard_deviation)
+                .collect(),
+        )
     }
 
     /// Returns the inputs for a reading.
@@ -349,7 +354,7 @@ impl LevenbergMarquardtLocator {
     }
 
     /// True where estimates have a force.
-    pub fn tells_force(&self) -> bool {
+    pub fn estimates_force(&self) -> bool {
         self.force_n.is_some() || self.force_output().is_some()
     }
 

@@ -97,7 +97,7 @@ fn even(repeats: usize) -> impl Iterator<Item = (f64, f64)> {
 }
 
 /// Mean error and coverage of the 95 % interval at `from`…`to` mm.
-fn judge(
+fn evaluate(
     locator: &LevenbergMarquardtLocator,
     setup: &Setup,
     (from, to): (u32, u32),
@@ -129,7 +129,7 @@ fn ten_clean_presses_of_the_papers_beam() {
     let setup = setup(0.0, Some(3.0));
     let locator = fit(&setup, &recording(&setup, even(1), 0));
     for (portion, bound_percent) in [((1, 399), 0.9), ((20, 380), 0.2), ((60, 300), 0.1)] {
-        let (mean_m, _) = judge(&locator, &setup, portion, 3.0);
+        let (mean_m, _) = evaluate(&locator, &setup, portion, 3.0);
         let percent = 100.0 * mean_m / 0.4;
         eprintln!("clean, {portion:?} mm: {percent:.3} %");
         assert!(percent < bound_percent, "{portion:?}: {percent} %");
@@ -141,7 +141,7 @@ fn noisy_presses_of_the_papers_beam_and_their_intervals() {
     let setup = setup(5e-6, Some(3.0));
     let locator = fit(&setup, &recording(&setup, even(10), 0));
     for (portion, bound_percent) in [((1, 399), 1.2), ((20, 380), 0.3)] {
-        let (mean_m, covered) = judge(&locator, &setup, portion, 3.0);
+        let (mean_m, covered) = evaluate(&locator, &setup, portion, 3.0);
         let percent = 100.0 * mean_m / 0.4;
         eprintln!("noisy, {portion:?} mm: {percent:.3} %, covered {covered:.3}");
         assert!(percent < bound_percent, "{portion:?}: {percent} %");
@@ -164,7 +164,7 @@ fn position_and_force_come_out_together() {
     let task = FitTask::new(&setup, &recording).seed(1);
     let config = LevenbergMarquardt { ensemble: 2, ..LevenbergMarquardt::default() };
     let locator = config.fit_method(task).unwrap();
-    let (mean_m, _) = judge(&locator, &setup, (40, 360), 3.0);
+    let (mean_m, _) = evaluate(&locator, &setup, (40, 360), 3.0);
     assert!(mean_m < 2e-3, "{mean_m}");
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
     for x_m in [0.1, 0.23, 0.3] {
@@ -175,7 +175,7 @@ fn position_and_force_come_out_together() {
 }
 
 #[test]
-fn what_cannot_be_trained_is_named() {
+fn untrainable_recordings_are_refused() {
     let setup = setup(0.0, Some(3.0));
     let one = recording(&setup, std::iter::repeat_n((0.1, 3.0), 5), 0);
     let two = recording(&setup, [(0.1, 3.0), (0.2, 3.0)].into_iter(), 0);

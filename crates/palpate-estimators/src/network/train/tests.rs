@@ -114,7 +114,7 @@ fn a_fixed_order_is_the_same_for_all() {
 }
 
 #[test]
-fn a_wild_step_diverges_and_says_so() {
+fn divergent_step_is_reported() {
     let mut config = Network { output_activation: Activation::Linear, ..config(10_000) };
     config.training.learning_rate = 1e6;
     config.hidden_activation = Activation::Linear;

@@ -72,7 +72,7 @@ fn sample_and_hold_counts_each_reading_once() {
             let repeats = treated.provenance.repeats.clone().unwrap();
             assert!(repeats.sample_and_hold && repeats.slow_channels.is_empty(), "{runs:?}: {repeats:?}");
             assert!(treated.rows.windows(2).all(|pair| pair[0].reading != pair[1].reading));
-            assert_eq!(repeats.left_out + treated.rows.len(), repeats.of);
+            assert_eq!(repeats.removed + treated.rows.len(), repeats.of);
             assert_eq!(treated.provenance.rows, treated.rows.len());
         }
     }
@@ -145,13 +145,13 @@ fn slow_channels_are_named() {
     let mixed = Logger { runs: [[1, 1], [4, 4], [1, 1], [4, 4]], ..FINE };
     let treated = mixed.treated(0);
     let repeats = treated.provenance.repeats.clone().unwrap();
-    assert_eq!((repeats.left_out, repeats.slow_channels), (0, vec!["raw_2".to_owned(), "raw_4".to_owned()]));
+    assert_eq!((repeats.removed, repeats.slow_channels), (0, vec!["raw_2".to_owned(), "raw_4".to_owned()]));
     insta::assert_snapshot!(treated.warning_lines().join("\n"));
     // Two boards slower than the logger: rows that repeat both count once, others still repeat one of them.
     let both = Logger { runs: [[2, 2], [7, 7], [2, 2], [7, 7]], ..FINE };
     let treated = both.treated(0);
     let repeats = treated.provenance.repeats.unwrap();
-    assert!(repeats.sample_and_hold && repeats.left_out > 70, "{repeats:?}");
+    assert!(repeats.sample_and_hold && repeats.removed > 70, "{repeats:?}");
     assert_eq!(repeats.slow_channels, ["raw_1", "raw_2", "raw_3", "raw_4"]);
 }
 

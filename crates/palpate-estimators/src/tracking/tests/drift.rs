@@ -123,7 +123,7 @@ fn a_drifting_finger_is_touched_only_when_something_touches() {
                 .iter_mut()
                 .zip(tare.iter().zip(&offsets))
                 .for_each(|(value, (tare, own))| *value += own - tare);
-            tracker.follow(bench.time_s, &reading).unwrap();
+            tracker.update(bench.time_s, &reading).unwrap();
             truths.push(contact.into_iter().collect::<Vec<Contact>>());
         }
         let smoothed = tracker.smoothed(Watch::NONE).unwrap();
@@ -161,7 +161,7 @@ fn without_drift_in_the_state_a_drifting_finger_seems_touched() {
     let mut tracker = Tracker::new(blind.tracking(&config).unwrap().likelihood(), config);
     let touched = (0..1000).filter(|_| {
         let reading = bench.reading(None, EVERY_S);
-        !tracker.follow(bench.time_s, &reading).unwrap().contacts.is_empty()
+        !tracker.update(bench.time_s, &reading).unwrap().contacts.is_empty()
     });
     assert!(touched.count() > 500);
 }

@@ -67,7 +67,7 @@ fn the_scores_of_a_fit_on_a_plane_are_the_slopes_of_its_misfit() {
 }
 
 #[test]
-fn what_calibration_leaves_falls_with_its_repeats() {
+fn calibration_variance_falls_with_repeats() {
     let rig = rig();
     let contact = Contact { position: Position { x_m: 0.12, y_m: 0.17 }, force_n: 5.0 };
     let left_m2 = |repeats: usize| {

@@ -51,15 +51,15 @@ pub struct LinkError {
 
 /// An open link.
 pub struct Link {
-    way: Way,
+    transport: Transport,
     name: String,
-    waiting: Vec<u8>,
+    pending: Vec<u8>,
     received: Vec<u8>,
     /// Frames lost without a reader, or with a slow one.
     pub unread: u64,
 }
 
-enum Way {
+enum Transport {
     Stdout(std::io::Stdout),
     #[cfg(unix)]
     Pty(pty::Pty),
@@ -120,7 +120,7 @@ impl Link {
     /// [`LinkError`].
     pub fn open(url: &LinkUrl) -> Result<Self, LinkError> {
         let (way, name) = open(url).map_err(|error| LinkError { url: url.clone(), error })?;
-        Ok(Self { way, name, waiting: Vec::new(), received: Vec::new(), unread: 0 })
+        Ok(Self { transport: way, name, pending: Vec::new(), received: Vec::new(), unread: 0 })
     }
 
     /// Name for clients: path or address.
@@ -129,9 +129,9 @@ impl Link {
     }
 
     /// Next message of a lost or restored broker.
-    pub fn news(&self) -> Option<String> {
-        match &self.way {
-            Way::Mqtt(publisher) => publisher.news(),
+    pub fn next_message(&self) -> Option<String> {
+        match &self.transport {
+            Transport::Mqtt(publisher) => publisher.next_message(),
             _ => None,
         }
     }
@@ -141,20 +141,20 @@ impl Link {
     /// # Errors
     /// A failed link, such as stdout without a reader.
     pub fn send(&mut self, frame: &[u8]) -> std::io::Result<()> {
-        match &mut self.way {
-            Way::Stdout(out) => {
+        match &mut self.transport {
+            Transport::Stdout(out) => {
                 out.write_all(frame)?;
                 return out.flush();
             }
-            Way::Udp { socket, to } => {
+            Transport::Udp { socket, to } => {
                 self.unread += u64::from(socket.send_to(frame, *to).is_err());
                 return Ok(());
             }
-            Way::Mqtt(publisher) => {
+            Transport::Mqtt(publisher) => {
                 self.unread += u64::from(!publisher.publish(frame));
                 return Ok(());
             }
-            Way::Tcp { listener, client } => {
+            Transport::Tcp { listener, client } => {
                 accept(listener, client)?;
                 if client.is_none() {
                     self.unread += 1;
@@ -162,27 +162,27 @@ impl Link {
                 }
             }
             #[cfg(unix)]
-            Way::Pty(_) => {}
+            Transport::Pty(_) => {}
         }
-        if self.waiting.len() + frame.len() > MOST_WAITING {
+        if self.pending.len() + frame.len() > MOST_WAITING {
             self.unread += 1;
         } else {
-            self.waiting.extend_from_slice(frame);
+            self.pending.extend_from_slice(frame);
         }
         self.push();
         Ok(())
     }
 
     fn push(&mut self) {
-        while !self.waiting.is_empty() {
-            let written = match &mut self.way {
-                Way::Tcp { client: Some(client), .. } => client.write(&self.waiting),
+        while !self.pending.is_empty() {
+            let written = match &mut self.transport {
+                Transport::Tcp { client: Some(client), .. } => client.write(&self.pending),
                 #[cfg(unix)]
-                Way::Pty(pty) => pty.master.write(&self.waiting),
+                Transport::Pty(pty) => pty.master.write(&self.pending),
                 _ => return,
             };
             match written {
-                Ok(count) if count > 0 => drop(self.waiting.drain(..count)),
+                Ok(count) if count > 0 => drop(self.pending.drain(..count)),
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(error) if error.kind() == ErrorKind::WouldBlock => return,
                 _ => return self.drop_client(),
@@ -191,9 +191,9 @@ impl Link {
     }
 
     fn drop_client(&mut self) {
-        self.waiting.clear();
+        self.pending.clear();
         self.received.clear();
-        if let Way::Tcp { client, .. } = &mut self.way {
+        if let Transport::Tcp { client, .. } = &mut self.transport {
             *client = None;
         }
     }
@@ -205,7 +205,7 @@ impl Link {
     pub fn disconnect(&mut self) -> std::io::Result<()> {
         self.drop_client();
         #[cfg(unix)]
-        if let Way::Pty(pty) = &mut self.way {
+        if let Transport::Pty(pty) = &mut self.transport {
             pty.reopen()?;
             self.name = pty.name();
         }
@@ -217,11 +217,11 @@ impl Link {
     /// # Errors
     /// A client that cannot be accepted.
     pub fn bytes(&mut self) -> std::io::Result<Option<Vec<u8>>> {
-        if let Way::Tcp { listener, client } = &mut self.way {
+        if let Transport::Tcp { listener, client } = &mut self.transport {
             accept(listener, client)?;
         }
         self.receive();
-        let is_there = !matches!(&self.way, Way::Tcp { client: None, .. });
+        let is_there = !matches!(&self.transport, Transport::Tcp { client: None, .. });
         Ok(is_there.then(|| std::mem::take(&mut self.received)))
     }
 
@@ -236,11 +236,11 @@ impl Link {
     fn receive(&mut self) {
         let mut buffer = [0; 512];
         loop {
-            let read = match &mut self.way {
-                Way::Tcp { client: Some(client), .. } => client.read(&mut buffer),
-                Way::Udp { socket, .. } => socket.recv(&mut buffer),
+            let read = match &mut self.transport {
+                Transport::Tcp { client: Some(client), .. } => client.read(&mut buffer),
+                Transport::Udp { socket, .. } => socket.recv(&mut buffer),
                 #[cfg(unix)]
-                Way::Pty(pty) => pty.master.read(&mut buffer),
+                Transport::Pty(pty) => pty.master.read(&mut buffer),
                 _ => break,
             };
             match read {
@@ -270,14 +270,14 @@ fn accept(listener: &TcpListener, client: &mut Option<TcpStream>) -> std::io::Re
     Ok(())
 }
 
-fn open(url: &LinkUrl) -> std::io::Result<(Way, String)> {
+fn open(url: &LinkUrl) -> std::io::Result<(Transport, String)> {
     match url {
-        LinkUrl::Stdout => Ok((Way::Stdout(std::io::stdout()), "stdout".to_owned())),
+        LinkUrl::Stdout => Ok((Transport::Stdout(std::io::stdout()), "stdout".to_owned())),
         #[cfg(unix)]
         LinkUrl::Pty(link) => {
             let pty = pty::Pty::open(link.clone())?;
             let name = pty.name();
-            Ok((Way::Pty(pty), name))
+            Ok((Transport::Pty(pty), name))
         }
         #[cfg(not(unix))]
         LinkUrl::Pty(_) => Err(std::io::Error::other("pseudo-terminals are not supported here; use tcp")),
@@ -285,15 +285,15 @@ fn open(url: &LinkUrl) -> std::io::Result<(Way, String)> {
             let listener = TcpListener::bind(address)?;
             listener.set_nonblocking(true)?;
             let name = format!("tcp://{}", listener.local_addr()?);
-            Ok((Way::Tcp { listener, client: None }, name))
+            Ok((Transport::Tcp { listener, client: None }, name))
         }
         LinkUrl::Udp(address) => {
             let to =
                 address.to_socket_addrs()?.next().ok_or_else(|| std::io::Error::other("no such host"))?;
             let socket = UdpSocket::bind(if to.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" })?;
             socket.set_nonblocking(true)?;
-            Ok((Way::Udp { socket, to }, format!("udp://{to}")))
+            Ok((Transport::Udp { socket, to }, format!("udp://{to}")))
         }
-        LinkUrl::Mqtt(url) => Ok((Way::Mqtt(publisher::Publisher::open(url)?), url.to_string())),
+        LinkUrl::Mqtt(url) => Ok((Transport::Mqtt(publisher::Publisher::open(url)?), url.to_string())),
     }
 }

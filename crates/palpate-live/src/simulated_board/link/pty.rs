@@ -20,7 +20,7 @@ impl Pty {
     pub fn open(link: Option<PathBuf>) -> std::io::Result<Self> {
         let (master, slave) = pair()?;
         let own = Self { master, slave, link };
-        own.lead_here()?;
+        own.create_link()?;
         Ok(own)
     }
 
@@ -28,7 +28,7 @@ impl Pty {
     pub fn reopen(&mut self) -> std::io::Result<()> {
         let (master, slave) = pair()?;
         (self.master, self.slave) = (master, slave);
-        self.lead_here()
+        self.create_link()
     }
 
     pub fn name(&self) -> String {
@@ -39,7 +39,7 @@ impl Pty {
     }
 
     /// Replaces a link, but no other file.
-    fn lead_here(&self) -> std::io::Result<()> {
+    fn create_link(&self) -> std::io::Result<()> {
         let Some(link) = &self.link else { return Ok(()) };
         if is_link(link) {
             std::fs::remove_file(link)?;

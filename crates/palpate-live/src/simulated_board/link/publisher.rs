@@ -12,7 +12,7 @@ const AGAIN_AFTER: Duration = Duration::from_millis(500);
 pub struct Publisher {
     client: Client,
     topic: String,
-    news: Receiver<String>,
+    messages: Receiver<String>,
 }
 
 impl Publisher {
@@ -23,11 +23,11 @@ impl Publisher {
         std::thread::Builder::new()
             .name("mqtt".to_owned())
             .spawn(move || drive(connection, &broker, &tell))?;
-        Ok(Self { client, topic: url.topic.clone(), news })
+        Ok(Self { client, topic: url.topic.clone(), messages: news })
     }
 
-    pub fn news(&self) -> Option<String> {
-        self.news.try_recv().ok()
+    pub fn next_message(&self) -> Option<String> {
+        self.messages.try_recv().ok()
     }
 
     /// Publishes a frame; false if too many wait.

@@ -114,19 +114,19 @@ impl Worker {
             let opened = config(&self.url.router).and_then(|config| zenoh::open(config).wait());
             // Batches that arrived meanwhile are outdated.
             while let Ok(batch) = batches.try_recv() {
-                self.lose(&batch);
+                self.count_lost(&batch);
             }
             match opened {
                 Ok(session) => {
-                    self.look(true);
+                    self.report_router(true);
                     return Ok(session);
                 }
-                Err(_) => self.look(false),
+                Err(_) => self.report_router(false),
             }
             let again_at = Instant::now() + AGAIN_AFTER;
             while let Some(left) = again_at.checked_duration_since(Instant::now()) {
                 match batches.recv_timeout(left) {
-                    Ok(batch) => self.lose(&batch),
+                    Ok(batch) => self.count_lost(&batch),
                     Err(RecvTimeoutError::Timeout) => {}
                     Err(RecvTimeoutError::Disconnected) => return Err(Ended),
                 }
@@ -139,7 +139,7 @@ impl Worker {
         loop {
             let next = batches.recv_timeout(LOOK_EVERY);
             if Instant::now() >= look_at {
-                self.look(has_router(session));
+                self.report_router(has_router(session));
                 look_at = Instant::now() + LOOK_EVERY;
             }
             match next {
@@ -150,18 +150,18 @@ impl Worker {
                         }
                     }
                 }
-                Ok(batch) => self.lose(&batch),
+                Ok(batch) => self.count_lost(&batch),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return,
             }
         }
     }
 
-    fn lose(&self, batch: &Batch) {
+    fn count_lost(&self, batch: &Batch) {
         self.lost.fetch_add(batch.outputs.len() as u64, Ordering::Relaxed);
     }
 
-    fn look(&mut self, is_there: bool) {
+    fn report_router(&mut self, is_there: bool) {
         match (self.was_there, is_there) {
             (Some(false), true) => self.report("is there again"),
             (None | Some(true), false) => self.report("cannot be reached; it is tried again"),

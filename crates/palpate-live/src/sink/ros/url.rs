@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said() {
+    fn invalid_urls_are_refused() {
         for (wrong, what) in [
             ("", "tcp/"),
             ("udp/h:1", "tcp/"),

@@ -21,7 +21,7 @@ fn three_newtons_at_the_tip_strain_the_clamp_by_3593_microstrain() {
 }
 
 #[test]
-fn a_small_force_reads_as_the_influence_says() {
+fn small_force_reads_as_the_influence_function() {
     for direction in [ForceDirection::Normal, ForceDirection::Vertical] {
         let digit = digit(direction);
         for (gauge_m, x_m) in [(0.0, 0.12), (0.02, 0.05), (0.08, 0.05), (0.05, 0.05)] {
@@ -34,7 +34,7 @@ fn a_small_force_reads_as_the_influence_says() {
 }
 
 #[test]
-fn a_gauge_beyond_the_contact_reads_nothing() {
+fn gauge_beyond_the_contact_reads_zero() {
     assert_eq!(strain(&digit(ForceDirection::Normal), 0.08, 0.06, 5.0), 0.0);
 }
 

@@ -30,7 +30,7 @@ fn unit(direction: ForceDirection, load: f64) -> Elastica {
 }
 
 #[test]
-fn a_vertical_end_load_bends_as_the_tables_say() {
+fn vertical_end_load_bends_as_tabulated() {
     // Mattiasson 1981: deflection w/L, shortening u/L and rotation of the tip.
     let table = [
         (1.0, 0.30172, 0.05643, 0.46135),
@@ -72,7 +72,7 @@ fn a_normal_force_turns_the_contact_by_a_right_angle_at_k_squared_and_by_two_at_
 }
 
 #[test]
-fn moments_balance_whatever_the_load() {
+fn moments_balance_for_any_load() {
     // At the clamp the moment is force times lever, independent of the curvatures.
     for load in [1e-6, 0.1, 3.0, 30.0, 300.0] {
         let finger = unit(Vertical, load);
@@ -87,7 +87,7 @@ fn moments_balance_whatever_the_load() {
 }
 
 #[test]
-fn a_small_load_bends_as_the_linear_theory_says_and_the_difference_is_of_second_order() {
+fn small_load_differs_from_linear_theory_in_second_order() {
     for direction in [Normal, Vertical] {
         let beyond = |load: f64| (unit(direction, load).curvature(0.4) / (load * 0.6) - 1.0).abs();
         let deflection = |load: f64| (-unit(direction, load).point(1.0)[1] / (load / 3.0) - 1.0).abs();

@@ -48,7 +48,7 @@ fn the_papers_beam_swings_at_17_hertz_and_is_critical_at_14_metres_a_second() {
 }
 
 #[test]
-fn a_steady_load_does_as_fryba_says_up_to_the_critical_speed() {
+fn steady_load_agrees_with_fryba_up_to_the_critical_speed() {
     let beam = paper(0.0);
     for ratio in [0.05, 0.3, 0.7, 0.999] {
         let speed = ratio * beam.critical_speed_m_per_s();

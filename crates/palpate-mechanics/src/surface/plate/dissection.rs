@@ -37,7 +37,7 @@ fn dissect(block: Block, order: &mut Vec<(usize, usize)>) {
 
 /// Upper bound of node pairs in the factor; a float, as meshes may be too large.
 pub(super) fn coupled_pairs(columns: usize, rows: usize) -> f64 {
-    Couplings::default().count(Surrounded {
+    Couplings::default().count(BlockShape {
         wide: columns,
         high: rows,
         left: 0,
@@ -49,7 +49,7 @@ pub(super) fn coupled_pairs(columns: usize, rows: usize) -> f64 {
 
 /// Size of a block, and 1 for each side with neighbours.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
-struct Surrounded {
+struct BlockShape {
     wide: usize,
     high: usize,
     left: usize,
@@ -58,7 +58,7 @@ struct Surrounded {
     above: usize,
 }
 
-impl Surrounded {
+impl BlockShape {
     fn surrounding_nodes(self) -> usize {
         let Self { wide, high, left, right, below, above } = self;
         (wide + left + right) * (high + below + above) - wide * high
@@ -66,25 +66,25 @@ impl Surrounded {
 }
 
 #[derive(Default)]
-struct Couplings(HashMap<Surrounded, f64>);
+struct Couplings(HashMap<BlockShape, f64>);
 
 impl Couplings {
-    fn count(&mut self, block: Surrounded) -> f64 {
+    fn count(&mut self, block: BlockShape) -> f64 {
         if let Some(pairs) = self.0.get(&block) {
             return *pairs;
         }
-        let Surrounded { wide, high, .. } = block;
+        let BlockShape { wide, high, .. } = block;
         let pairs = if wide * high <= LEAF_NODES {
             eliminated(wide * high, block.surrounding_nodes())
         } else if wide >= high {
             let line = wide / 2;
-            self.count(Surrounded { wide: line, right: 1, ..block })
-                + self.count(Surrounded { wide: wide - line - 1, left: 1, ..block })
+            self.count(BlockShape { wide: line, right: 1, ..block })
+                + self.count(BlockShape { wide: wide - line - 1, left: 1, ..block })
                 + eliminated(high, block.surrounding_nodes())
         } else {
             let line = high / 2;
-            self.count(Surrounded { high: line, above: 1, ..block })
-                + self.count(Surrounded { high: high - line - 1, below: 1, ..block })
+            self.count(BlockShape { high: line, above: 1, ..block })
+                + self.count(BlockShape { high: high - line - 1, below: 1, ..block })
                 + eliminated(wide, block.surrounding_nodes())
         };
         self.0.insert(block, pairs);

@@ -1,7 +1,7 @@
 //! Influence functions of sensors on a plate, and full scales.
 
 use super::mesh::{Derivative, Mesh, NODE_DEGREES};
-use super::solved::{Functional, Solved, TOGETHER};
+use super::solution::{Functional, PlateSolution, TOGETHER};
 use super::spec::{self, PlateSpec};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
@@ -18,23 +18,23 @@ pub(super) struct PlateInfluence {
 impl PlateInfluence {
     pub fn of_all(
         spec: &PlateSpec,
-        solved: &Solved,
+        solved: &PlateSolution,
         kind: SensorKind,
         sensors: &[Position],
         watch: Watch,
     ) -> Result<Vec<Self>, Cancelled> {
-        let reads: Vec<Reads> =
-            sensors.iter().map(|sensor| Reads::new(spec, solved, kind, *sensor)).collect();
-        let load = |reads: &Reads| match reads {
-            Reads::Shape(functional, factor) => Some((functional.clone(), *factor)),
-            Reads::Contact(_) | Reads::Nothing => None,
+        let reads: Vec<SensorResponse> =
+            sensors.iter().map(|sensor| SensorResponse::new(spec, solved, kind, *sensor)).collect();
+        let load = |reads: &SensorResponse| match reads {
+            SensorResponse::Shape(functional, factor) => Some((functional.clone(), *factor)),
+            SensorResponse::Contact(_) | SensorResponse::Nothing => None,
         };
         let loads: Vec<_> = reads.iter().filter_map(load).collect();
         let mut solutions = solved.solutions(&loads, watch)?.into_iter();
         let degrees = reads.into_iter().filter_map(|reads| match reads {
-            Reads::Shape(..) => solutions.next(),
-            Reads::Contact(degrees) => Some(degrees),
-            Reads::Nothing => Some(vec![0.0; solved.mesh.degrees()]),
+            SensorResponse::Shape(..) => solutions.next(),
+            SensorResponse::Contact(degrees) => Some(degrees),
+            SensorResponse::Nothing => Some(vec![0.0; solved.mesh.degrees()]),
         });
         Ok(degrees.map(|degrees| Self { mesh: solved.mesh, degrees }).collect())
     }
@@ -93,14 +93,14 @@ fn curvature(mesh: &Mesh, at: Position) -> Functional {
     }
 }
 
-enum Reads {
+enum SensorResponse {
     Shape(Functional, f64),
     Contact(Vec<f64>),
     Nothing,
 }
 
-impl Reads {
-    fn new(spec: &PlateSpec, solved: &Solved, kind: SensorKind, at: Position) -> Self {
+impl SensorResponse {
+    fn new(spec: &PlateSpec, solved: &PlateSolution, kind: SensorKind, at: Position) -> Self {
         let mesh = &solved.mesh;
         match kind {
             SensorKind::Deflection => Self::Shape(weights(mesh, at, Derivative::None), -1.0),
@@ -112,7 +112,7 @@ impl Reads {
         }
     }
 
-    fn reaction(spec: &PlateSpec, solved: &Solved, at: Position) -> Self {
+    fn reaction(spec: &PlateSpec, solved: &PlateSolution, at: Position) -> Self {
         let force = spec::support_at(spec, at).and_then(|support| solved.reaction(support));
         force.map_or(Self::Nothing, Self::Contact)
     }
@@ -120,21 +120,23 @@ impl Reads {
 
 /// Readings by contact: the sensors' functionals of the shape K⁻¹·f.
 pub(super) struct PlateReadings<'a> {
-    solved: &'a Solved,
-    sensors: Vec<Reads>,
+    solved: &'a PlateSolution,
+    sensors: Vec<SensorResponse>,
 }
 
 impl<'a> PlateReadings<'a> {
-    pub const BYTES_EACH: f64 = (size_of::<Reads>() + 4 * NODE_DEGREES * size_of::<(usize, f64)>()) as f64;
+    pub const BYTES_EACH: f64 =
+        (size_of::<SensorResponse>() + 4 * NODE_DEGREES * size_of::<(usize, f64)>()) as f64;
 
-    pub fn new(spec: &PlateSpec, solved: &'a Solved, sensors: &[(SensorKind, Position)]) -> Self {
-        let sensors = sensors.iter().map(|(kind, at)| Reads::new(spec, solved, *kind, *at)).collect();
+    pub fn new(spec: &PlateSpec, solved: &'a PlateSolution, sensors: &[(SensorKind, Position)]) -> Self {
+        let sensors =
+            sensors.iter().map(|(kind, at)| SensorResponse::new(spec, solved, *kind, *at)).collect();
         Self { solved, sensors }
     }
 }
 
 impl ReadingsByContact for PlateReadings<'_> {
-    fn under(&self, loads: &[ContactLoad]) -> Vec<Vec<f64>> {
+    fn readings_of_loads(&self, loads: &[ContactLoad]) -> Vec<Vec<f64>> {
         let mesh = &self.solved.mesh;
         let load = |load: &ContactLoad| match *load {
             ContactLoad::Force(at) => weights(mesh, at, Derivative::None),
@@ -147,10 +149,10 @@ impl ReadingsByContact for PlateReadings<'_> {
         };
         let loads: Vec<(Functional, f64)> = loads.iter().map(|of| (load(of), 1.0)).collect();
         let readings = |(shape, (load, _)): (Vec<f64>, &(Functional, f64))| {
-            let reading = |reads: &Reads| match reads {
-                Reads::Shape(functional, factor) => factor * value(functional, &shape),
-                Reads::Contact(degrees) => value(load, degrees),
-                Reads::Nothing => 0.0,
+            let reading = |reads: &SensorResponse| match reads {
+                SensorResponse::Shape(functional, factor) => factor * value(functional, &shape),
+                SensorResponse::Contact(degrees) => value(load, degrees),
+                SensorResponse::Nothing => 0.0,
             };
             self.sensors.iter().map(reading).collect()
         };
@@ -166,7 +168,7 @@ impl ReadingsByContact for PlateReadings<'_> {
         weights(&self.solved.mesh, contact, Derivative::None)
     }
 
-    fn together(&self) -> usize {
+    fn batch_size(&self) -> usize {
         TOGETHER
     }
 }
@@ -182,13 +184,13 @@ pub(super) fn full_scales(spec: &PlateSpec) -> [f64; SensorKind::ALL.len()] {
         // Only the finer mesh separates the supports.
         coarse.elements = spec.elements;
     }
-    match Solved::new(&coarse, Watch::NONE) {
+    match PlateSolution::new(&coarse, Watch::NONE) {
         Ok(solved) => SensorKind::ALL.map(|kind| largest(&coarse, &solved, kind)),
         Err(_) => [f64::NAN; SensorKind::ALL.len()],
     }
 }
 
-fn largest(spec: &PlateSpec, solved: &Solved, kind: SensorKind) -> f64 {
+fn largest(spec: &PlateSpec, solved: &PlateSolution, kind: SensorKind) -> f64 {
     let sensors: Vec<Position> = match kind {
         SensorKind::Raw => Vec::new(),
         SensorKind::Reaction => spec.supports.iter().map(|support| support.position).collect(),

@@ -12,8 +12,8 @@ pub(super) const NODE_DEGREES: usize = 4;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Mesh {
-    pub across: usize,
-    pub up: usize,
+    pub columns: usize,
+    pub rows: usize,
     pub side_x_m: f64,
     pub side_y_m: f64,
 }
@@ -43,24 +43,24 @@ impl Mesh {
         let side_m = length_m.max(width_m) / elements as f64;
         let along = |size_m: f64| ((size_m / side_m - 1e-9).ceil() as usize).max(FEWEST);
         let (across, up) = (along(length_m), along(width_m));
-        Self { across, up, side_x_m: length_m / across as f64, side_y_m: width_m / up as f64 }
+        Self { columns: across, rows: up, side_x_m: length_m / across as f64, side_y_m: width_m / up as f64 }
     }
 
     pub fn nodes(&self) -> (usize, usize) {
-        (self.across + 1, self.up + 1)
+        (self.columns + 1, self.rows + 1)
     }
 
     pub fn degrees(&self) -> usize {
-        NODE_DEGREES * (self.across + 1) * (self.up + 1)
+        NODE_DEGREES * (self.columns + 1) * (self.rows + 1)
     }
 
     pub fn first_degree(&self, column: usize, row: usize) -> usize {
-        NODE_DEGREES * (row * (self.across + 1) + column)
+        NODE_DEGREES * (row * (self.columns + 1) + column)
     }
 
     pub fn locate(&self, position: Position) -> MeshPoint {
-        let (column, xi) = element_at(position.x_m / self.side_x_m, self.across);
-        let (row, eta) = element_at(position.y_m / self.side_y_m, self.up);
+        let (column, xi) = element_at(position.x_m / self.side_x_m, self.columns);
+        let (row, eta) = element_at(position.y_m / self.side_y_m, self.rows);
         MeshPoint { column, row, xi, eta }
     }
 
@@ -94,9 +94,9 @@ impl Mesh {
     }
 
     #[inline]
-    fn factors(&self, point: MeshPoint, of: Derivative) -> (Four, Four) {
+    fn factors(&self, point: MeshPoint, of: Derivative) -> (CornerValues, CornerValues) {
         let MeshPoint { xi, eta, .. } = point;
-        let over = |functions: Four, side_m: f64| functions.map(|value| value / side_m);
+        let over = |functions: CornerValues, side_m: f64| functions.map(|value| value / side_m);
         match of {
             Derivative::None => (values(xi), values(eta)),
             Derivative::X => (over(slopes(xi), self.side_x_m), values(eta)),
@@ -113,26 +113,26 @@ fn element_at(steps: f64, count: usize) -> (usize, f64) {
     (element, steps - element as f64)
 }
 
-type Four = [f64; 4];
+type CornerValues = [f64; 4];
 
 type Integrals = [[f64; 4]; 4];
 
-fn values(xi: f64) -> Four {
+fn values(xi: f64) -> CornerValues {
     let (square, cube) = (xi * xi, xi * xi * xi);
     [1.0 - 3.0 * square + 2.0 * cube, xi - 2.0 * square + cube, 3.0 * square - 2.0 * cube, cube - square]
 }
 
-fn slopes(xi: f64) -> Four {
+fn slopes(xi: f64) -> CornerValues {
     let square = xi * xi;
     [6.0 * square - 6.0 * xi, 1.0 - 4.0 * xi + 3.0 * square, 6.0 * xi - 6.0 * square, 3.0 * square - 2.0 * xi]
 }
 
-fn curvatures(xi: f64) -> Four {
+fn curvatures(xi: f64) -> CornerValues {
     [12.0 * xi - 6.0, 6.0 * xi - 4.0, 6.0 - 12.0 * xi, 6.0 * xi - 2.0]
 }
 
 /// ∫ fᵢ·gⱼ dξ, exact up to degree 7.
-fn integrals(f: fn(f64) -> Four, g: fn(f64) -> Four) -> Integrals {
+fn integrals(f: fn(f64) -> CornerValues, g: fn(f64) -> CornerValues) -> Integrals {
     let mut sums = Integrals::default();
     for (xi, weight) in gauss_points() {
         let (f, g) = (f(xi), g(xi));

@@ -1,11 +1,11 @@
 //! Rectangular Kirchhoff plates by the elements of Bogner, Fox and Schmit.
 
+mod cache;
 mod dissection;
 mod influence;
-mod kept;
 mod mesh;
 mod rigid;
-mod solved;
+mod solution;
 mod spec;
 mod supports;
 
@@ -22,10 +22,10 @@ use super::{
 };
 use crate::contact::Position;
 use crate::sensing::SensorKind;
+use cache::InfluenceCache;
 use influence::{NotANumber, PlateInfluence, PlateReadings, full_scales};
-use kept::Kept;
 use palpate_numerics::watch::{Cancelled, Watch};
-use solved::Solved;
+use solution::PlateSolution;
 
 /// A checked plate, factored at the first request, once for all clones.
 ///
@@ -57,15 +57,15 @@ use solved::Solved;
 #[serde(try_from = "PlateSpec", into = "PlateSpec")]
 pub struct Plate {
     spec: PlateSpec,
-    computed: Arc<Computed>,
+    computed: Arc<PlateResults>,
 }
 
 #[derive(Default)]
-struct Computed {
-    solved: OnceLock<Result<Solved, Unsolvable>>,
+struct PlateResults {
+    solved: OnceLock<Result<PlateSolution, Unsolvable>>,
     /// One thread solves, others wait.
     solving: Mutex<()>,
-    influences: Kept,
+    influences: InfluenceCache,
     full_scales: OnceLock<[f64; SensorKind::ALL.len()]>,
 }
 
@@ -133,16 +133,16 @@ impl Plate {
     /// As [`Plate::solve`].
     pub fn factor_size(&self) -> Result<usize, PlateError> {
         let solved = self.solved(Watch::NONE);
-        solved.map(Solved::stored_numbers).map_err(|reason| PlateError::Unsolvable { reason })
+        solved.map(PlateSolution::stored_numbers).map_err(|reason| PlateError::Unsolvable { reason })
     }
 
     /// Cancelled work is restarted by the next call.
-    fn solved(&self, watch: Watch) -> Result<&Solved, Unsolvable> {
-        let Computed { solved, solving, .. } = &*self.computed;
+    fn solved(&self, watch: Watch) -> Result<&PlateSolution, Unsolvable> {
+        let PlateResults { solved, solving, .. } = &*self.computed;
         if solved.get().is_none() {
             let _alone = solving.lock().unwrap_or_else(PoisonError::into_inner);
             if solved.get().is_none() {
-                let result = Solved::new(&self.spec, watch);
+                let result = PlateSolution::new(&self.spec, watch);
                 match result {
                     Err(stopped) if Cancelled::caused(&stopped) => return Err(Cancelled.into()),
                     result => drop(solved.set(result)),

@@ -14,20 +14,20 @@ pub(super) struct RigidMotions {
 
 impl RigidMotions {
     pub fn new(mesh: &Mesh, edges: Edges) -> Self {
-        let [_, far_x, far_y] = motions_at(mesh, mesh.first_degree(mesh.across, mesh.up));
-        let (middle_x, middle_y) = (mesh.across / 2, mesh.up / 2);
+        let [_, far_x, far_y] = motions_at(mesh, mesh.first_degree(mesh.columns, mesh.rows));
+        let (middle_x, middle_y) = (mesh.columns / 2, mesh.rows / 2);
         let sides = [
-            (edges.left, [0.0, 1.0, 0.0], (mesh.across, middle_y)),
+            (edges.left, [0.0, 1.0, 0.0], (mesh.columns, middle_y)),
             (edges.right, [far_x, -1.0, 0.0], (0, middle_y)),
-            (edges.bottom, [0.0, 0.0, 1.0], (middle_x, mesh.up)),
+            (edges.bottom, [0.0, 0.0, 1.0], (middle_x, mesh.rows)),
             (edges.top, [far_y, 0.0, -1.0], (middle_x, 0)),
         ];
         let held: Vec<_> = sides.into_iter().filter(|(edge, ..)| *edge != Edge::Free).collect();
         let left = match held[..] {
             [] => vec![
                 ([1.0, 0.0, 0.0], (0, 0)),
-                ([0.0, 1.0, 0.0], (mesh.across, 0)),
-                ([0.0, 0.0, 1.0], (0, mesh.up)),
+                ([0.0, 1.0, 0.0], (mesh.columns, 0)),
+                ([0.0, 0.0, 1.0], (0, mesh.rows)),
             ],
             [(Edge::Simple, motion, node)] => vec![(motion, node)],
             _ => Vec::new(),
@@ -71,9 +71,9 @@ impl RigidMotions {
 
 pub(super) fn motions_at(mesh: &Mesh, degree: usize) -> Motions {
     let (node, which) = (degree / NODE_DEGREES, degree % NODE_DEGREES);
-    let (column, row) = (node % (mesh.across + 1), node / (mesh.across + 1));
+    let (column, row) = (node % (mesh.columns + 1), node / (mesh.columns + 1));
     let size_m = |count: usize, side_m: f64| count as f64 * side_m;
-    let longer_m = size_m(mesh.across, mesh.side_x_m).max(size_m(mesh.up, mesh.side_y_m));
+    let longer_m = size_m(mesh.columns, mesh.side_x_m).max(size_m(mesh.rows, mesh.side_y_m));
     match which {
         0 => [1.0, size_m(column, mesh.side_x_m) / longer_m, size_m(row, mesh.side_y_m) / longer_m],
         1 => [0.0, mesh.side_x_m / longer_m, 0.0],

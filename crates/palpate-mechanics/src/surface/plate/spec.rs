@@ -445,7 +445,7 @@ pub(super) fn insensitive_sensor(
     };
     if let Some((edge, how)) = edges_at(spec, position).find(still) {
         let held = if how == Edge::Clamped { "clamped" } else { "simply supported" };
-        return Some(InsensitiveSensor::AtEdge { edge, held, kind });
+        return Some(InsensitiveSensor::AtEdge { edge, constraint: held, kind });
     }
     let support = support_at(spec, position).filter(|i| spec.supports[*i].is_rigid())?;
     (kind == SensorKind::Deflection).then_some(InsensitiveSensor::AtSupport { number: support + 1 })

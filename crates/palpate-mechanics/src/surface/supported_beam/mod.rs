@@ -24,7 +24,7 @@ use super::{Extent, InfluenceFunction, InsensitiveSensor, Surface};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
 use spec::SAME_PLACE;
-use structure::{Disturbance, Element, Hold, Shape, Site, State, Structure};
+use structure::{Disturbance, Element, Shape, Site, State, Structure, SupportCompliance};
 
 /// Rounding error, relative to full scale.
 const ROUNDING: f64 = 1e-12;
@@ -111,7 +111,7 @@ impl SupportedBeam {
     fn shape_at(&self, kind: SensorKind, site: Site) -> Shape {
         match self.disturbance(kind, site) {
             Some(disturbance) => self.structure.shape(site, disturbance),
-            None => self.structure.unbent(),
+            None => self.structure.rigid_shape(),
         }
     }
 
@@ -141,11 +141,11 @@ impl Surface for SupportedBeam {
     fn is_supported_at(&self, position: Position) -> bool {
         let slack_m = SAME_PLACE * self.spec.length_m;
         let here = |support: &BeamSupport| (support.at_m - position.x_m).abs() <= slack_m;
-        self.spec.supports.iter().any(|support| support.kind.takes_force() && here(support))
+        self.spec.supports.iter().any(|support| support.kind.has_reaction_force() && here(support))
     }
 
     fn force_supports(&self) -> Vec<Position> {
-        let takers = self.spec.supports.iter().filter(|support| support.kind.takes_force());
+        let takers = self.spec.supports.iter().filter(|support| support.kind.has_reaction_force());
         let mut places: Vec<Position> = takers.map(|support| Position::along(support.at_m)).collect();
         places.sort_by(|a, b| a.x_m.total_cmp(&b.x_m));
         places
@@ -192,10 +192,9 @@ fn structure(spec: &SupportedBeamSpec, stiffness_nm2: f64) -> Structure {
     nodes.dedup_by(|next, before| *next - *before <= SAME_PLACE);
     let hold = |place: &f64| {
         let here = |support: &&BeamSupport| (support.at_m / l - place).abs() <= SAME_PLACE;
-        spec.supports
-            .iter()
-            .find(here)
-            .map_or(Hold::default(), |support| hold(support.kind, l, stiffness_nm2))
+        spec.supports.iter().find(here).map_or(SupportCompliance::default(), |support| {
+            support_compliance(support.kind, l, stiffness_nm2)
+        })
     };
     let element = |ends: &[f64]| {
         let middle_m = 0.5 * (ends[0] + ends[1]) * l;
@@ -210,14 +209,19 @@ fn structure(spec: &SupportedBeamSpec, stiffness_nm2: f64) -> Structure {
 }
 
 /// Compliances: 1 N makes V jump by l³/D, 1 N·m makes M jump by l²/D, slopes are multiplied by l.
-fn hold(kind: BeamSupportKind, l: f64, stiffness_nm2: f64) -> Hold {
+fn support_compliance(kind: BeamSupportKind, l: f64, stiffness_nm2: f64) -> SupportCompliance {
     let rigid = |takes: bool| takes.then_some(0.0);
     match kind {
-        BeamSupportKind::Elastic { stiffness_n_per_m, rotational_stiffness_nm_per_rad } => Hold {
-            yielding: Some(stiffness_nm2 / (stiffness_n_per_m * l.powi(3))),
-            turning: rotational_stiffness_nm_per_rad.map(|stiffness| stiffness_nm2 / (stiffness * l)),
+        BeamSupportKind::Elastic { stiffness_n_per_m, rotational_stiffness_nm_per_rad } => {
+            SupportCompliance {
+                yielding: Some(stiffness_nm2 / (stiffness_n_per_m * l.powi(3))),
+                turning: rotational_stiffness_nm_per_rad.map(|stiffness| stiffness_nm2 / (stiffness * l)),
+            }
+        }
+        _ => SupportCompliance {
+            yielding: rigid(kind.has_reaction_force()),
+            turning: rigid(kind.has_reaction_couple()),
         },
-        _ => Hold { yielding: rigid(kind.takes_force()), turning: rigid(kind.takes_couple()) },
     }
 }
 

@@ -82,12 +82,12 @@ impl BeamSupportKind {
     }
 
     /// True for a support with a reaction force.
-    pub const fn takes_force(self) -> bool {
+    pub const fn has_reaction_force(self) -> bool {
         matches!(self, Self::Simple | Self::Clamped | Self::Elastic { .. })
     }
 
     /// True for a support with a reaction couple.
-    pub const fn takes_couple(self) -> bool {
+    pub const fn has_reaction_couple(self) -> bool {
         matches!(
             self,
             Self::Clamped | Self::Guided | Self::Elastic { rotational_stiffness_nm_per_rad: Some(_), .. }
@@ -169,8 +169,8 @@ impl SupportedBeamSpec {
     }
 
     fn check_held(&self) -> Result<(), SupportedBeamError> {
-        let mut forces = self.supports.iter().filter(|support| support.kind.takes_force());
-        let couples = self.supports.iter().any(|support| support.kind.takes_couple());
+        let mut forces = self.supports.iter().filter(|support| support.kind.has_reaction_force());
+        let couples = self.supports.iter().any(|support| support.kind.has_reaction_couple());
         let motion = match (forces.next(), forces.next(), couples) {
             (Some(_), Some(_), _) | (Some(_), None, true) => return Ok(()),
             (Some(only), None, false) => RigidMotion::Turning { about_m: only.at_m },

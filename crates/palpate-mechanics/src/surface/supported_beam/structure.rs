@@ -16,7 +16,7 @@ use palpate_numerics::small::solve_general;
 pub(super) struct Structure {
     length_m: f64,
     pub nodes: Vec<f64>,
-    pub holds: Vec<Hold>,
+    pub holds: Vec<SupportCompliance>,
     pub elements: Vec<Element>,
     forth: Sweep,
     back: Sweep,
@@ -36,20 +36,25 @@ pub(super) enum Disturbance {
     Settlement,
 }
 
-struct Surroundings {
+struct AdjacentStates {
     /// Left states, in the factors of `left_element` of the forward sweep.
     left: Pair,
     left_element: Option<usize>,
     /// Right states, in the factors of `right_element` of the backward sweep.
     right: Pair,
     right_element: Option<usize>,
-    hold: Hold,
+    hold: SupportCompliance,
     /// True with the support left of the disturbance.
     held_left: bool,
 }
 
 impl Structure {
-    pub fn new(length_m: f64, nodes: Vec<f64>, holds: Vec<Hold>, elements: Vec<Element>) -> Self {
+    pub fn new(
+        length_m: f64,
+        nodes: Vec<f64>,
+        holds: Vec<SupportCompliance>,
+        elements: Vec<Element>,
+    ) -> Self {
         let forth = Sweep::new(holds.iter().copied().zip(elements.iter().copied()));
         let mirrored = holds.iter().rev().copied().zip(elements.iter().rev().copied());
         let back = Sweep::new(mirrored);
@@ -73,7 +78,7 @@ impl Structure {
     }
 
     /// Support at a site; `None` between nodes.
-    pub fn hold_at(&self, Site { element, offset }: Site) -> Option<Hold> {
+    pub fn hold_at(&self, Site { element, offset }: Site) -> Option<SupportCompliance> {
         if offset <= 0.0 {
             Some(self.holds[element])
         } else {
@@ -81,7 +86,7 @@ impl Structure {
         }
     }
 
-    pub fn unbent(&self) -> Shape {
+    pub fn rigid_shape(&self) -> Shape {
         let nothing = State::DEFLECTION * 0.0;
         let piece = Piece { from: 0.0, to: 1.0, start: nothing, end: nothing, stiffness: 1.0 };
         Shape { length_m: self.length_m, pieces: vec![piece] }
@@ -95,7 +100,7 @@ impl Structure {
         Shape { length_m: self.length_m, pieces }
     }
 
-    fn surroundings(&self, Site { element, offset }: Site) -> Surroundings {
+    fn surroundings(&self, Site { element, offset }: Site) -> AdjacentStates {
         let last = self.elements.len() - 1;
         let Element { length, stiffness, .. } = self.elements[element];
         // Elements to the right of this one, first in the backward sweep.
@@ -114,10 +119,10 @@ impl Structure {
         };
         let hold = self.hold_at(Site { element, offset }).unwrap_or_default();
         let right = right.map(State::mirrored);
-        Surroundings { left, left_element, right, right_element, hold, held_left: offset <= 0.0 }
+        AdjacentStates { left, left_element, right, right_element, hold, held_left: offset <= 0.0 }
     }
 
-    fn pieces_left(&self, site: Site, around: &Surroundings, factors: Factors) -> Vec<Piece> {
+    fn pieces_left(&self, site: Site, around: &AdjacentStates, factors: Factors) -> Vec<Piece> {
         let Some(nearest) = around.left_element else { return Vec::new() };
         let states = self.forth.back_from(nearest, factors);
         let mut pieces = self.pieces((0..=nearest).rev(), states);
@@ -141,7 +146,7 @@ impl Structure {
         elements.zip(states).map(piece).collect()
     }
 
-    fn pieces_right(&self, site: Site, around: &Surroundings, factors: Factors) -> Vec<Piece> {
+    fn pieces_right(&self, site: Site, around: &AdjacentStates, factors: Factors) -> Vec<Piece> {
         let Some(nearest) = around.right_element else { return Vec::new() };
         let first = self.elements.len() - 1 - nearest;
         let states = self.back.back_from(nearest, factors);
@@ -155,7 +160,7 @@ impl Structure {
     }
 }
 
-impl Surroundings {
+impl AdjacentStates {
     /// Solves for the factors: jumps by disturbance, force and couple, and two laws of the support.
     fn fitted(&self, disturbance: Disturbance) -> (Factors, Factors) {
         let (jump, settlement) = match disturbance {
@@ -267,7 +272,7 @@ type Factors = [f64; 2];
 
 /// Compliances for force and couple; 0 is rigid, `None` free.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Hold {
+pub(super) struct SupportCompliance {
     pub yielding: Option<f64>,
     pub turning: Option<f64>,
 }
@@ -294,11 +299,12 @@ struct Passage {
 const FREE: Pair = [State::DEFLECTION, State::SLOPE];
 
 impl Sweep {
-    pub fn new(elements: impl Iterator<Item = (Hold, Element)>) -> Self {
+    pub fn new(elements: impl Iterator<Item = (SupportCompliance, Element)>) -> Self {
         let mut passages = Vec::new();
         let mut pair = FREE;
         for (hold, element) in elements {
-            let (start, before) = orthonormal(turned(yielded((pair, UNMIXED), hold.yielding), hold.turning));
+            let (start, before) =
+                orthonormal(apply_rotation(apply_deflection((pair, UNMIXED), hold.yielding), hold.turning));
             let end = start.map(|state| state.advanced(element.length, element.stiffness));
             passages.push(Passage { start, end, before });
             pair = end;
@@ -340,22 +346,22 @@ fn mixed([first, second]: [Factors; 2], [a, b]: Factors) -> Factors {
 
 /// Pair behind a support of compliance c: the state without deflection is unchanged, the other gets a force
 /// of −w/c, times c as c may be 0.
-fn yielded(mixture: Mixture, yielding: Option<f64>) -> Mixture {
+fn apply_deflection(mixture: Mixture, yielding: Option<f64>) -> Mixture {
     let Some(c) = yielding else { return mixture };
-    let ((still, still_mix), (moving, moving_mix)) = parted(mixture, |state| state.deflection);
+    let ((still, still_mix), (moving, moving_mix)) = split_parts(mixture, |state| state.deflection);
     let met = moving * c + State::SHEAR * -moving.deflection;
     ([State { deflection: 0.0, ..still }, met], [still_mix, moving_mix.map(|factor| factor * c)])
 }
 
-/// As [`yielded`], for rotation.
-fn turned(mixture: Mixture, turning: Option<f64>) -> Mixture {
+/// As [`apply_deflection`], for rotation.
+fn apply_rotation(mixture: Mixture, turning: Option<f64>) -> Mixture {
     let Some(c) = turning else { return mixture };
-    let ((still, still_mix), (moving, moving_mix)) = parted(mixture, |state| state.slope);
+    let ((still, still_mix), (moving, moving_mix)) = split_parts(mixture, |state| state.slope);
     let met = moving * c + State::MOMENT * moving.slope;
     ([State { slope: 0.0, ..still }, met], [still_mix, moving_mix.map(|factor| factor * c)])
 }
 
-fn parted((pair, mix): Mixture, part: fn(State) -> f64) -> ((State, Factors), (State, Factors)) {
+fn split_parts((pair, mix): Mixture, part: fn(State) -> f64) -> ((State, Factors), (State, Factors)) {
     let [a, b] = pair.map(part);
     let size = a.hypot(b);
     let [a, b] = if size > 0.0 { [a / size, b / size] } else { [0.0, 1.0] };

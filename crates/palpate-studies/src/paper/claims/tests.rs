@@ -5,9 +5,9 @@ use crate::{ArmOutcome, PreparedStudy, Study, TrainedSeed};
 use palpate_numerics::watch::Watch;
 
 /// Error in % of the length, and epochs.
-type MadeUp = fn(&str, u32) -> (f64, u32);
+type SyntheticArms = fn(&str, u32) -> (f64, u32);
 
-fn judged(made_up: MadeUp) -> Vec<Claim> {
+fn checked_claims(made_up: SyntheticArms) -> Vec<Claim> {
     let text = crate::paper::STUDY_TOML.replace("max_epochs = 1_000_000", "max_epochs = 1");
     let prepared = PreparedStudy::new(Study::from_toml(&text).unwrap(), Watch::NONE).unwrap();
     let mut outcomes = Vec::new();
@@ -32,7 +32,7 @@ fn judged(made_up: MadeUp) -> Vec<Claim> {
         });
         outcomes.push(ArmOutcome { name: arm.name.clone(), fits: fits.collect() });
     }
-    claims(&outcomes, &prepared.study.judging)
+    claims(&outcomes, &prepared.study.evaluation)
 }
 
 fn verdicts(claims: &[Claim]) -> Vec<bool> {
@@ -41,7 +41,7 @@ fn verdicts(claims: &[Claim]) -> Vec<bool> {
 
 #[test]
 fn a_world_as_the_paper_has_it_bears_every_claim_out() {
-    let claims = judged(|family, count| {
+    let claims = checked_claims(|family, count| {
         let error = match (family, count) {
             ("position", 10) => 2.2,
             ("position", 20) => 1.0,
@@ -65,7 +65,7 @@ fn a_world_as_the_paper_has_it_bears_every_claim_out() {
 
 #[test]
 fn a_world_upside_down_bears_none_out() {
-    let claims = judged(|family, count| {
+    let claims = checked_claims(|family, count| {
         let error = if family == "position" { -1.0 } else { -6.0 };
         (error * f64::from(count), if family == "position" { 10 } else { 100 - count })
     });
@@ -75,6 +75,6 @@ fn a_world_upside_down_bears_none_out() {
 
 #[test]
 fn arms_that_were_not_run_leave_their_claims_out() {
-    let none = claims(&[], &Study::from_toml(crate::paper::STUDY_TOML).unwrap().judging);
+    let none = claims(&[], &Study::from_toml(crate::paper::STUDY_TOML).unwrap().evaluation);
     assert_eq!(none, []);
 }

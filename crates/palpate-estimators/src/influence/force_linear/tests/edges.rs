@@ -49,7 +49,7 @@ fn check(mut plate: [(Bench, ForceLinearLocator); 1], places_mm: &[f64]) {
             let position = Position { x_m: 1e-3 * place_mm, y_m: rng.random_range(0.06..SIDE_M - 0.06) };
             Contact { position, force_n: FORCE_N }
         });
-        let least = row.percent(row.along).min(row.percent(row.across)).min(row.percent(row.force));
+        let least = row.percent(row.x_covered).min(row.percent(row.y_covered)).min(row.percent(row.force));
         assert!(least >= LEAST_PERCENT && row.outside == 0, "{place_mm} mm: {row:?}");
     }
 }

@@ -53,14 +53,14 @@ fn covered_at(
     readings: usize,
     place_mm: f64,
     force_n: f64,
-) -> Covered {
+) -> CoverageTally {
     let contact = Contact { position: Position::along(1e-3 * place_mm), force_n };
     covered(beams, readings, |_| contact)
 }
 
 /// False where so few contacts of a row are in their intervals that a coverage of 90 % gives fewer in one sample of a thousand.
-fn is_covered(row: &Covered, covered: usize) -> bool {
-    binomial_tail(row.found, row.found - covered, 0.1) > 1e-3
+fn is_covered(row: &CoverageTally, covered: usize) -> bool {
+    binomial_tail(row.detected, row.detected - covered, 0.1) > 1e-3
 }
 
 #[test]
@@ -79,7 +79,7 @@ fn contacts_beyond_the_outermost_press_are_in_their_intervals() {
         let mut beams: Vec<_> = (0..BEAMS).map(beam).collect();
         for place_mm in PLACES_MM {
             let row = covered_at(&mut beams, READINGS, place_mm, 3.0);
-            if !is_covered(&row, row.along) || !is_covered(&row, row.force) || row.outside > 0 {
+            if !is_covered(&row, row.x_covered) || !is_covered(&row, row.force) || row.outside > 0 {
                 wrong.push(format!("{presses:?} {pressed:?}, {place_mm} mm: {row:?}"));
             }
         }
@@ -102,7 +102,7 @@ fn contacts_of_known_force_beyond_the_outermost_press_are_in_their_intervals() {
     let mut beams: Vec<_> = (0..BEAMS).map(beam).collect();
     for place_mm in PLACES_MM {
         let row = covered_at(&mut beams, READINGS, place_mm, FORCE_N);
-        if !is_covered(&row, row.along) || row.outside > 0 {
+        if !is_covered(&row, row.x_covered) || row.outside > 0 {
             wrong.push(format!("{place_mm} mm: {row:?}"));
         }
     }
@@ -142,8 +142,8 @@ fn contacts_between_few_places_of_a_beam_are_in_their_intervals() {
         );
         for place_mm in [20.0, 45.0, 60.0, 75.0, 120.0, 200.0] {
             let row = covered_at(&mut beams, 100, place_mm, 3.0);
-            let is_held = row.percent(row.along) >= 75.0 && row.percent(row.force) >= 70.0;
-            assert!(is_held && row.outside == 0 && row.found == row.readings, "{place_mm} mm: {row:?}");
+            let is_held = row.percent(row.x_covered) >= 75.0 && row.percent(row.force) >= 70.0;
+            assert!(is_held && row.outside == 0 && row.detected == row.readings, "{place_mm} mm: {row:?}");
         }
     }
 }

@@ -126,7 +126,7 @@ fn one_simple_edge_and_a_soft_spring_balance() {
 }
 
 #[test]
-fn held_edges_balance_on_every_mesh() {
+fn supported_edges_balance_on_every_mesh() {
     for elements in [8, 64] {
         for edges in [
             Edges::all(Edge::Clamped),

@@ -15,7 +15,7 @@ fn strip(left: Edge, right: Edge) -> Plate {
 fn across(plate: &Plate, kind: SensorKind, sensor: Position, x_m: f64) -> f64 {
     let influence = plate.influence_function(kind, sensor);
     let mesh = mesh_of(plate);
-    let places = simpson(mesh.up, mesh.side_y_m);
+    let places = simpson(mesh.rows, mesh.side_y_m);
     places.iter().map(|(y_m, weight)| weight * influence.at(at(x_m, *y_m))).sum::<f64>() / WIDTH_M
 }
 

@@ -27,7 +27,7 @@ proptest! {
     fn constant_curvatures_have_their_bending_energy(
         curvatures in [-1.0..1.0f64, -1.0..1.0f64, -1.0..1.0f64], nu in -0.9..0.5f64, width in 0.2..3.0f64,
     ) {
-        let mesh = Mesh { across: 1, up: 1, side_x_m: 0.7, side_y_m: width };
+        let mesh = Mesh { columns: 1, rows: 1, side_x_m: 0.7, side_y_m: width };
         let stiffness = element_stiffness(&mesh, 5.0, nu);
         let w = bent(&mesh, curvatures);
         let forces = stiffness.map(|row| row.iter().zip(&w).map(|(k, w)| k * w).sum::<f64>());
@@ -72,7 +72,8 @@ fn no_factor_is_larger_than_was_estimated() {
 #[test]
 fn a_mesh_has_no_element_longer_than_wide_unless_four_are_too_many() {
     let mesh = |length_m, width_m, elements| {
-        let Mesh { across, up, .. } = Mesh::new(Extent::plane(length_m, width_m).unwrap(), elements);
+        let Mesh { columns: across, rows: up, .. } =
+            Mesh::new(Extent::plane(length_m, width_m).unwrap(), elements);
         (across, up)
     };
     assert_eq!(mesh(0.3, 0.3, 48), (48, 48));

@@ -51,7 +51,7 @@ fn deflection(plate: &Plate, sensor: Position, contact: Position) -> f64 {
 fn under_uniform_load(plate: &Plate, kind: SensorKind, sensor: Position) -> f64 {
     let influence = plate.influence_function(kind, sensor);
     let mesh = mesh_of(plate);
-    let (along_x, along_y) = (simpson(mesh.across, mesh.side_x_m), simpson(mesh.up, mesh.side_y_m));
+    let (along_x, along_y) = (simpson(mesh.columns, mesh.side_x_m), simpson(mesh.rows, mesh.side_y_m));
     let lines = along_y.iter().map(|(y_m, weight_y)| {
         let line: f64 = along_x.iter().map(|(x_m, weight_x)| weight_x * influence.at(at(*x_m, *y_m))).sum();
         weight_y * line

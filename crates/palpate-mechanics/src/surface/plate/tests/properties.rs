@@ -200,7 +200,7 @@ fn no_influence_exceeds_its_full_scale_by_much() {
 }
 
 #[test]
-fn a_plate_is_what_its_description_says_whatever_was_computed() {
+fn plate_equality_ignores_computed_results() {
     let spec = ON_POINTS.spec().clone();
     let fresh = Plate::new(spec).unwrap();
     assert_eq!(*ON_POINTS, fresh);
@@ -249,11 +249,11 @@ fn readings_by_contact_are_those_of_the_influence_functions() {
         sensors.push((SensorKind::Raw, at(0.1, 0.1)));
         let readings = plate.readings_by_contact(&sensors).unwrap();
         for contact in [at(0.07, 0.03), at(0.15, 0.1), at(0.29, 0.19)] {
-            let under = readings.under(&ContactLoad::all(contact));
+            let under = readings.readings_of_loads(&ContactLoad::all(contact));
             let around = readings.degrees(contact);
             let loads: Vec<ContactLoad> =
                 around.iter().map(|(degree, _)| ContactLoad::Degree(*degree)).collect();
-            let nodal = readings.under(&loads);
+            let nodal = readings.readings_of_loads(&loads);
             for (i, (kind, sensor)) in sensors.iter().enumerate() {
                 let function = plate.influence_function(*kind, *sensor);
                 let [along, across] = function.gradient(contact);

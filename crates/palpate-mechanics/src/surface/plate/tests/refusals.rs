@@ -12,7 +12,7 @@ fn on_points(points: &[(f64, f64)]) -> PlateSpec {
 }
 
 #[test]
-fn what_cannot_be_computed_is_refused_with_value_and_bound() {
+fn uncomputable_plate_is_refused_with_value_and_bound() {
     let one_edge = Edges { bottom: Edge::Simple, ..Edges::all(Edge::Free) };
     let refused = [
         PlateSpec { thickness_m: 0.0, ..sound() },
@@ -46,7 +46,7 @@ fn what_cannot_be_computed_is_refused_with_value_and_bound() {
 }
 
 #[test]
-fn a_sensor_that_would_read_nothing_is_told_so() {
+fn insensitive_sensor_is_refused() {
     let edges = Edges { left: Edge::Simple, right: Edge::Free, bottom: Edge::Clamped, top: Edge::Simple };
     let spec =
         PlateSpec { edges, supports: vec![simple_at(0.2, 0.1), elastic_at(0.25, 0.1, 1e3)], ..sound() };

@@ -10,7 +10,7 @@ fn spec() -> PlateSpec {
 }
 
 #[test]
-fn factoring_stops_at_any_look_and_begins_anew() {
+fn factoring_stops_at_any_check_and_restarts() {
     let (whole, interrupted) = (plate(spec()), Plate::new(spec()).unwrap());
     let ((), looks) = stopped_at_every_look(|watch| interrupted.check_solution_watched(watch));
     assert!(looks > 20, "{looks} looks");
@@ -19,7 +19,7 @@ fn factoring_stops_at_any_look_and_begins_anew() {
 }
 
 #[test]
-fn influence_functions_stop_at_any_look_and_are_then_the_same() {
+fn influence_functions_stop_at_any_check_and_repeat_equally() {
     let (whole, interrupted) = (plate(spec()), Plate::new(spec()).unwrap());
     let sensors: Vec<Position> = (0..60).map(|i| at(0.005 * f64::from(i), 0.1)).collect();
     let (found, _) = stopped_at_every_look(|watch| {

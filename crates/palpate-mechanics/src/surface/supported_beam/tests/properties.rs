@@ -134,7 +134,7 @@ proptest! {
 
     /// Additional nodes at any distance do not change the beam.
     #[test]
-    fn sections_that_are_equal_change_nothing(
+    fn equal_sections_equal_one_section(
         supports in proptest::collection::btree_map(0..=40u32, any_kind(), 1..5),
         cuts in proptest::collection::btree_set(1..400_000u32, 1..20),
     ) {
@@ -151,7 +151,7 @@ proptest! {
     }
 
     #[test]
-    fn nothing_is_larger_than_full_scale(beam in any_beam(), x in 0.0..=1.0, a in 0.0..=1.0) {
+    fn no_reading_exceeds_full_scale(beam in any_beam(), x in 0.0..=1.0, a in 0.0..=1.0) {
         let l = beam.length_m();
         for kind in [Deflection, Slope, Strain] {
             let found = at(&beam, kind, x * l, a * l).abs();

@@ -8,7 +8,7 @@ fn sections(ends_m: &[f64]) -> SupportedBeamSpec {
 }
 
 #[test]
-fn beams_that_cannot_be_are_refused_with_the_reason_and_what_to_do() {
+fn invalid_beams_are_refused_with_reason_and_remedy() {
     let cantilever = paper_on(&[(0.0, Clamped)]);
     let thin = |thickness_m| {
         let mut spec = cantilever.clone();
@@ -68,7 +68,7 @@ fn sensors_that_a_support_holds_never_move() {
 }
 
 #[test]
-fn a_beam_is_told_in_words() {
+fn beam_is_described_in_words() {
     let spec = paper_on(&[(0.4, spring(2000.0, Some(0.5))), (0.0, Clamped), (0.2, spring(50.0, None))]);
     let words = "clamped at 0 mm, elastic (50 N/m) at 200 mm, elastic (2 N/mm and 0.5 Nm/rad) at 400 mm";
     assert_eq!(spec.supports_in_words(), words);

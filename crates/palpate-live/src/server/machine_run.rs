@@ -24,7 +24,7 @@ pub fn listen(inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
             Ok(Input::Arrived(arrived)) => arrived,
             Ok(Input::Stop) | Err(RecvTimeoutError::Disconnected) => return,
             Ok(Input::Command(_)) | Err(RecvTimeoutError::Timeout) => {
-                locked(shared).look();
+                locked(shared).check_source();
                 continue;
             }
         };
@@ -59,7 +59,7 @@ impl MachineRun {
         });
         self.attendance.set_needed(false);
         let mut shared = locked(shared);
-        let left_out = shared.machine.left_out;
+        let left_out = shared.machine.omitted;
         if let Err(error) = outcome {
             shared.problem = Some(format!("{error}: {}", error.help()));
         } else if left_out > 0 && shared.problem.is_none() {
@@ -105,15 +105,15 @@ impl MachineRun {
             let mut shared = locked(shared);
             let notes = match arrived {
                 Some(arrived) => shared.receive(&arrived),
-                None => shared.look(),
+                None => shared.check_source(),
             };
-            machine.heed(&notes)?;
+            machine.stop_on_notes(&notes)?;
             while let Some(task) = shared.tasks.pop_front() {
                 machine.ask(task);
             }
             let now = self.clock.elapsed();
             match machine.step(now, &mut shared.calibration)? {
-                Some(MachineNote::Unseen | MachineNote::NoRest) => shared.machine.left_out += 1,
+                Some(MachineNote::Unseen | MachineNote::NoRest) => shared.machine.omitted += 1,
                 Some(MachineNote::SetUp(note)) => shared.take_set_up(note),
                 Some(MachineNote::Homing) | None => {}
             }

@@ -1,13 +1,13 @@
 //! Outputs of `record` and `serve`: ROS 2 and Foxglove.
 
-use crate::failure::{Complaint, Failure};
+use crate::failure::{Failure, UserError};
 use palpate_live::sink::OpenSink;
 use palpate_live::sink::ros::RosUrl;
 use std::net::SocketAddr;
 
 /// Options of the outlets.
 #[derive(clap::Args)]
-pub struct Outlets {
+pub struct SinkOptions {
     /// Publish contacts and forces to ROS 2 through a Zenoh router: `tcp/host:7447?domain=0&name=palpate&frame=surface`
     #[arg(long, value_name = "ROUTER")]
     ros: Option<RosUrl>,
@@ -16,7 +16,7 @@ pub struct Outlets {
     foxglove: Option<SocketAddr>,
 }
 
-impl Outlets {
+impl SinkOptions {
     pub fn open(&self) -> Result<Vec<OpenSink>, Failure> {
         let mut sinks = Vec::new();
         if let Some(url) = &self.ros {
@@ -49,7 +49,7 @@ fn foxglove(address: SocketAddr) -> Result<OpenSink, Failure> {
     use crate::remark::remark;
     use palpate_live::sink::foxglove::FoxgloveServer;
     let server = FoxgloveServer::start(address)
-        .map_err(|error| Complaint::new(error).help("--foxglove 127.0.0.1:0 takes a port that is free"))?;
+        .map_err(|error| UserError::new(error).help("--foxglove 127.0.0.1:0 takes a port that is free"))?;
     let address = server.address();
     remark!("palpate: Foxglove connects to ws://{address}");
     if !address.ip().is_loopback() {
@@ -66,7 +66,7 @@ fn foxglove(_: SocketAddr) -> Result<OpenSink, Failure> {
 #[cfg(not(all(feature = "ros", feature = "foxglove")))]
 fn not_built(option: &str, feature: &str) -> Failure {
     let complaint =
-        Complaint::new(format!("{option}: this command was built without its feature `{feature}`"));
+        UserError::new(format!("{option}: this command was built without its feature `{feature}`"));
     complaint
         .help(format!("build it with: cargo install --path crates/palpate-cli --features {feature}"))
         .into()

@@ -2,13 +2,13 @@
 
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_estimators::estimator::{
-    Locator, NotTrackable, Track, Tracked, Tracker, TrackerConfig, Tracking,
+    Locator, NotTrackable, Track, TrackedContact, Tracker, TrackerConfig, Tracking,
 };
 use palpate_estimators::status::PLACE_LEFT_OPEN;
 use palpate_mechanics::surface::Extent;
 
 /// Tracker that returns estimates.
-pub struct Follower {
+pub struct EstimateTracker {
     tracking: Tracking,
     config: TrackerConfig,
     tracker: Tracker,
@@ -18,7 +18,7 @@ pub struct Follower {
     baseline: Vec<f64>,
 }
 
-impl Follower {
+impl EstimateTracker {
     /// Creates a tracker.
     ///
     /// # Errors
@@ -39,10 +39,10 @@ impl Follower {
     /// increase.
     ///
     /// A state that is not finite, as after a reading of 1e300, restarts the tracker with `single`.
-    pub fn follow(&mut self, unix_ns: u64, reading: &[f64], tared: &[f64], single: Estimate) -> Estimate {
+    pub fn update(&mut self, unix_ns: u64, reading: &[f64], tared: &[f64], single: Estimate) -> Estimate {
         let time_s = unix_ns.saturating_sub(*self.first_ns.get_or_insert(unix_ns)) as f64 * 1e-9;
         self.follow_baseline(reading, tared);
-        let Ok(track) = self.tracker.follow(time_s, tared) else { return single };
+        let Ok(track) = self.tracker.update(time_s, tared) else { return single };
         let estimate = self.estimate(&track, track.single);
         // Weights that are not finite remain so in all later steps.
         let has_probability = (track.numbers.iter().sum::<f64>() - 1.0).abs() < 1e-6;
@@ -71,14 +71,14 @@ impl Follower {
     /// - `ambiguous`: the 95 % interval leaves the position undetermined.
     fn estimate(&self, track: &Track, single: Estimate) -> Estimate {
         let is_outside = single.status == Status::OutsideModel && self.config.swing.is_none();
-        let mut contacts = track.contacts.iter().map(Tracked::estimate);
+        let mut contacts = track.contacts.iter().map(TrackedContact::estimate);
         let Some(first) = contacts.next() else {
             let status = if is_outside { Status::OutsideModel } else { Status::NoContact };
             return Estimate::of_contact(single.contact, status);
         };
         let status = if is_outside {
             Status::OutsideModel
-        } else if self.leaves_place_open(&first) {
+        } else if self.is_undetermined(&first) {
             Status::Ambiguous
         } else {
             Status::Located
@@ -91,7 +91,7 @@ impl Follower {
         estimate
     }
 
-    fn leaves_place_open(&self, contact: &ContactEstimate) -> bool {
+    fn is_undetermined(&self, contact: &ContactEstimate) -> bool {
         let Some(uncertainty) = &contact.uncertainty else { return false };
         let is_open = |(low_m, high_m): (f64, f64), side_m: f64| high_m - low_m >= PLACE_LEFT_OPEN * side_m;
         is_open(uncertainty.x_95_m, self.extent.length_m())

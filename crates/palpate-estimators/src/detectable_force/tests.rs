@@ -18,7 +18,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 const READINGS: usize = 400;
 
 /// Detection probability of a contact.
-fn found(bench: &Example, locator: &Locator, contact: Contact) -> f64 {
+fn detection_probability(bench: &Example, locator: &Locator, contact: Contact) -> f64 {
     let (surface, layout) = (bench.setup.surface().model().unwrap(), bench.setup.layout());
     let clean = CleanSensors::new(surface, layout).reading(contact);
     let errors = ChannelErrors::none(layout);
@@ -32,12 +32,16 @@ fn found(bench: &Example, locator: &Locator, contact: Contact) -> f64 {
 
 /// Checks that forces a tenth below are detected less often than the stated probability, and those a tenth
 /// above more often.
-fn check(name: &str, bench: &Example, locator: &Locator, touch: &LightestTouch, positions: &[Position]) {
+fn check(name: &str, bench: &Example, locator: &Locator, touch: &DetectableForce, positions: &[Position]) {
     for position in positions {
-        for (share, force_n) in LightestTouch::FOUND.into_iter().zip(touch.forces_at(*position)) {
+        for (share, force_n) in DetectableForce::FOUND.into_iter().zip(touch.forces_at(*position)) {
             let force_n = force_n.unwrap();
             let [less, more] = [0.9, 1.1].map(|times| {
-                found(bench, locator, Contact { position: *position, force_n: times * force_n })
+                detection_probability(
+                    bench,
+                    locator,
+                    Contact { position: *position, force_n: times * force_n },
+                )
             });
             println!("{name}, {position:?}: {force_n:.5} N is found in {share}: {less:.3} {more:.3}");
             assert!(less < share && share < more, "{name} {position:?} {share}: {less} {more}");
@@ -129,13 +133,13 @@ fn the_scatter_of_untouched_rows_hides_touches_that_noise_would_not() {
     let limit = bench.setup.cramer_rao_bound().unwrap();
     let by_noise = || Influence::default().lightest_touch(&limit);
     let positions = ALONG.map(Position::along);
-    let noise_alone = locator.beyond_scatter(by_noise());
+    let noise_alone = locator.add_scatter(by_noise());
     assert_eq!(noise_alone.forces_at(positions[1]), by_noise().forces_at(positions[1]));
     let (centre, sd) = (vec![0.0; 8], vec![5e-6; 8]);
     locator.untouched_scatter = Some(UntouchedScatter { centre, sd, bound: 100.0 });
-    let touch = locator.beyond_scatter(by_noise());
-    let [noise_n, scatter_n] = [by_noise(), locator.beyond_scatter(by_noise())]
-        .map(|touch| touch.forces_at(positions[1])[1].unwrap());
+    let touch = locator.add_scatter(by_noise());
+    let [noise_n, scatter_n] =
+        [by_noise(), locator.add_scatter(by_noise())].map(|touch| touch.forces_at(positions[1])[1].unwrap());
     assert!(scatter_n > 1.5 * noise_n, "{scatter_n} {noise_n}");
     check("scatter", &bench, &locator, &touch, &positions);
     // The force by the scatter does not depend on the assumed noise.
@@ -144,7 +148,7 @@ fn the_scatter_of_untouched_rows_hides_touches_that_noise_would_not() {
         .edit_sensors(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 1e-6))
         .unwrap();
     let limit = quiet.cramer_rao_bound().unwrap();
-    let supposed = locator.beyond_scatter(Influence::default().lightest_touch(&limit));
+    let supposed = locator.add_scatter(Influence::default().lightest_touch(&limit));
     let [_, supposed_n] = supposed.forces_at(positions[1]).map(Option::unwrap);
     assert!((supposed_n / scatter_n - 1.0).abs() < 1e-6, "{supposed_n} {scatter_n}");
 }
@@ -153,7 +157,7 @@ fn the_scatter_of_untouched_rows_hides_touches_that_noise_would_not() {
 fn a_surface_that_does_not_notice_has_no_lightest_touch() {
     let detection = Detection { channels: 3, unknowns: 2, square: 16.0, taken: 11.0 };
     let noise_sds = vec![(0, 1.0), (1, 1.0), (2, 1.0)];
-    let new = |change| LightestTouch::new(detection, FalseAlarmRate::default(), noise_sds.clone(), change);
+    let new = |change| DetectableForce::new(detection, FalseAlarmRate::default(), noise_sds.clone(), change);
     let touch = new(Box::new(|_| vec![0.0; 3]));
     assert_eq!(touch.forces_at(Position::along(0.1)), [None, None]);
     assert_eq!(touch.summaries(&[Position::along(0.1)]), [None, None]);

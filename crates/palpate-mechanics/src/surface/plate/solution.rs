@@ -13,7 +13,7 @@ use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{SparseCholesky, SparseSymmetric};
 
 /// Factored equations: K₀ₕ, and the supports by the force method, also off the nodes.
-pub(super) struct Solved {
+pub(super) struct PlateSolution {
     pub mesh: Mesh,
     unknowns: Unknowns,
     factor: SparseCholesky,
@@ -38,7 +38,7 @@ struct Balance {
     by_edges: Vec<(usize, Motions)>,
 }
 
-impl Solved {
+impl PlateSolution {
     /// Factors the equations and checks them by a grid of forces.
     ///
     /// # Errors
@@ -98,7 +98,7 @@ impl Solved {
     fn solve(&self, loads: &[&Functional], watch: Watch) -> Result<Vec<Shape>, Cancelled> {
         let each = |load: &&Functional| self.unknowns.gathered(load.iter().copied());
         let solved = self.swept(&loads.iter().map(each).collect::<Vec<_>>(), watch)?;
-        let mut shapes: Vec<Shape> = solved.into_iter().map(Shape::held).collect();
+        let mut shapes: Vec<Shape> = solved.into_iter().map(Shape::supported_shape).collect();
         for (shape, load) in shapes.iter_mut().zip(loads) {
             self.hold(shape, load, &load.iter().copied());
         }
@@ -115,7 +115,7 @@ impl Solved {
             let changes = self.swept(&residuals.iter().map(each).collect::<Vec<_>>(), watch)?;
             for (((shape, load), residual), change) in off.iter_mut().zip(loads).zip(&residuals).zip(changes)
             {
-                let mut better = Shape::held(change);
+                let mut better = Shape::supported_shape(change);
                 self.hold(&mut better, load, &residual.iter().copied().enumerate());
                 better.add(shape);
                 better.imbalance = self.imbalance(&better, load);
@@ -145,7 +145,8 @@ impl Solved {
         };
         add(load, 1.0);
         self.supports.deflections.iter().zip(&shape.forces).for_each(|(of, force)| add(of, *force));
-        for (column, row) in (0..mesh.up).flat_map(|row| (0..mesh.across).map(move |column| (column, row))) {
+        for (column, row) in (0..mesh.rows).flat_map(|row| (0..mesh.columns).map(move |column| (column, row)))
+        {
             let degrees: [usize; 16] = std::array::from_fn(|i| {
                 let (x, y) = (i % 4, i / 4);
                 mesh.first_degree(column + x / 2, row + y / 2) + x % 2 + 2 * (y % 2)
@@ -213,7 +214,7 @@ struct Shape {
 }
 
 impl Shape {
-    fn held(bent: Vec<f64>) -> Self {
+    fn supported_shape(bent: Vec<f64>) -> Self {
         Self { bent, forces: Vec::new(), moved: Vec::new(), imbalance: f64::NAN }
     }
 
@@ -288,7 +289,7 @@ impl Balance {
         let mut sums: Vec<Motions> = vec![[0.0; 3]; mesh.degrees()];
         let (columns, rows) = mesh.nodes();
         for (column, row) in (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row))) {
-            let held = held_degrees(mesh, edges, column, row);
+            let held = constrained_degrees(mesh, edges, column, row);
             for degree in (0..NODE_DEGREES).filter(|degree| held[*degree]) {
                 let degree = mesh.first_degree(column, row) + degree;
                 let arms = rigid::motions_at(mesh, degree);
@@ -356,7 +357,7 @@ impl Unknowns {
         let mut degrees = Vec::with_capacity(mesh.degrees());
         for (column, row) in nested_dissection(columns, rows) {
             let first = mesh.first_degree(column, row);
-            let held = held_degrees(mesh, edges, column, row);
+            let held = constrained_degrees(mesh, edges, column, row);
             for degree in (0..NODE_DEGREES).filter(|degree| !held[*degree]).map(|degree| first + degree) {
                 if nodes.contains(&degree) {
                     continue;
@@ -401,12 +402,12 @@ impl Unknowns {
 }
 
 /// Constrained degrees of freedom: w and its derivative along a supported edge, all four on a clamped edge.
-fn held_degrees(mesh: &Mesh, edges: Edges, column: usize, row: usize) -> [bool; NODE_DEGREES] {
+fn constrained_degrees(mesh: &Mesh, edges: Edges, column: usize, row: usize) -> [bool; NODE_DEGREES] {
     let on = [
         (column == 0, edges.left, [true, false, true, false]),
-        (column == mesh.across, edges.right, [true, false, true, false]),
+        (column == mesh.columns, edges.right, [true, false, true, false]),
         (row == 0, edges.bottom, [true, true, false, false]),
-        (row == mesh.up, edges.top, [true, true, false, false]),
+        (row == mesh.rows, edges.top, [true, true, false, false]),
     ];
     let mut held = [false; NODE_DEGREES];
     for (_, edge, simple) in on.into_iter().filter(|(on, ..)| *on) {
@@ -467,12 +468,12 @@ impl Column {
 
 fn element_column(mesh: &Mesh, element: &ElementStiffness, degree: usize) -> Column {
     let (node, own) = (degree / NODE_DEGREES, degree % NODE_DEGREES);
-    let node = (node % (mesh.across + 1), node / (mesh.across + 1));
+    let node = (node % (mesh.columns + 1), node / (mesh.columns + 1));
     let mut column = Column { node, couplings: [[0.0; NODE_DEGREES]; NEIGHBOURS] };
     for (end_y, end_x) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         // The element with this node as its end: its first node is (node.0 − end_x, node.1 − end_y).
         let fits = |at: usize, end: usize, count: usize| at >= end && at - end < count;
-        if !(fits(node.0, end_x, mesh.across) && fits(node.1, end_y, mesh.up)) {
+        if !(fits(node.0, end_x, mesh.columns) && fits(node.1, end_y, mesh.rows)) {
             continue;
         }
         let row = &element[local(end_x, end_y, own)];

@@ -6,7 +6,7 @@ use palpate_mechanics::units::{format_count, format_length_mm};
 use palpate_numerics::regression::Kernel;
 
 /// Describes structure, influence functions, offsets, noise and disturbances.
-pub fn learnt(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
+pub fn parameter_lines(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     let channels =
         linear.channels().map(|(c, offset, noise)| format!("{}: {}", names[c], with_noise(offset, noise)));
     let presses = format_count(linear.presses() as u64);
@@ -33,7 +33,7 @@ pub(super) fn decimals(value: f64, digits: i32) -> usize {
 }
 
 /// Describes structure, drift, scatter and excluded rows.
-pub fn learnt_summary(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
+pub fn summary_lines(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     let mut lines = vec![structure(linear)];
     lines.extend(disturbances(linear, names));
     lines

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Cross-validated errors of a candidate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Tried {
+pub struct CandidateErrors {
     /// Name: [`Estimator::name`](crate::estimator::Estimator::name).
     pub name: String,
     /// Mean error.
@@ -17,7 +17,7 @@ pub struct Tried {
     pub coverage_percent: Option<f64>,
 }
 
-impl Tried {
+impl CandidateErrors {
     /// Geometric mean of mean error and interval score.
     pub fn score_m(&self) -> f64 {
         (self.mean_error_m * self.interval_score_m).sqrt()

@@ -14,13 +14,13 @@ const MOST_BYTES: usize = 16 << 20;
 
 /// Samples of 10 minutes at 10 a second, and last events, as JSON.
 #[derive(Clone, Debug, Default)]
-pub struct Past {
+pub struct History {
     samples: VecDeque<(f64, Arc<str>)>,
     sample_bytes: usize,
     events: VecDeque<Arc<str>>,
 }
 
-impl Past {
+impl History {
     /// True for the first sample of a tenth of a second.
     pub fn is_due(&self, time_s: f64) -> bool {
         self.samples.back().is_none_or(|(last_s, _)| (time_s * PER_S).floor() > (last_s * PER_S).floor())
@@ -75,8 +75,8 @@ fn push_list<'a>(json: &mut String, texts: impl Iterator<Item = &'a Arc<str>>) {
 mod tests {
     use super::*;
 
-    fn filled(rate_hz: f64, seconds: f64) -> Past {
-        let mut past = Past::default();
+    fn filled(rate_hz: f64, seconds: f64) -> History {
+        let mut past = History::default();
         for i in 0..(rate_hz * seconds) as u64 {
             let time_s = i as f64 / rate_hz;
             if past.is_due(time_s) {
@@ -101,7 +101,7 @@ mod tests {
 
     #[test]
     fn bounds_bytes_and_events() {
-        let mut past = Past::default();
+        let mut past = History::default();
         for i in 0..200 {
             past.push_sample(f64::from(i), &"x".repeat(1 << 18));
         }
@@ -119,6 +119,6 @@ mod tests {
         let record: serde_json::Value = serde_json::from_str(&past.to_json()).unwrap();
         assert_eq!(record["samples"].as_array().unwrap().len(), 5);
         assert_eq!(record["events"][0]["text"], "a \"nut\"");
-        assert_eq!(Past::default().to_json(), "{\"samples\":[],\"events\":[]}");
+        assert_eq!(History::default().to_json(), "{\"samples\":[],\"events\":[]}");
     }
 }

@@ -13,7 +13,7 @@ use palpate_numerics::{chi_squared_critical_value, push_rest};
 use std::sync::OnceLock;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct About {
+pub(crate) struct BoundedContact {
     /// Position along and across, and force.
     pub at: [f64; 3],
     /// Equal ends for a known quantity.
@@ -27,14 +27,17 @@ const STEP: f64 = 1e-3;
 const LEAST_LEFT: f64 = 1e-3;
 
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct SpreadDirections {
+pub(crate) struct DistributedContactDirections {
     units: Vec<Vec<f64>>,
     is_line: bool,
 }
 
-impl SpreadDirections {
+impl DistributedContactDirections {
     /// `reads` returns the reading of a contact over the noise.
-    pub fn about(About { at, ends }: About, mut reads: impl FnMut([f64; 3]) -> Vec<f64>) -> Self {
+    pub fn at_contact(
+        BoundedContact { at, ends }: BoundedContact,
+        mut reads: impl FnMut([f64; 3]) -> Vec<f64>,
+    ) -> Self {
         let side = |k: usize| ends[k].1 - ends[k].0;
         let is_free = |k: usize| side(k) > 0.0;
         let is_line = !is_free(1);
@@ -82,18 +85,18 @@ impl SpreadDirections {
     }
 }
 
-/// About the best point contact; `reads` as for [`SpreadDirections::about`].
-pub(crate) fn spread_score(
-    about: About,
+/// About the best point contact; `reads` as for [`DistributedContactDirections::at_contact`].
+pub(crate) fn distributed_contact_score(
+    about: BoundedContact,
     reading: impl IntoIterator<Item = f64>,
     mut reads: impl FnMut([f64; 3]) -> Vec<f64>,
 ) -> f64 {
     let residual: Vec<f64> = reading.into_iter().zip(reads(about.at)).map(|(d, f)| d - f).collect();
-    SpreadDirections::about(about, reads).score(&residual)
+    DistributedContactDirections::at_contact(about, reads).score(&residual)
 }
 
 /// Critical value at [`SPREAD_RATE`].
-pub(crate) fn spread_bound(dimensions: usize) -> f64 {
+pub(crate) fn distributed_contact_bound(dimensions: usize) -> f64 {
     static KNOWN: [OnceLock<f64>; 2] = [const { OnceLock::new() }; 2];
     if dimensions == 1 {
         // One-sided test.

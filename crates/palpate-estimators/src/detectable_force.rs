@@ -23,7 +23,7 @@ use palpate_numerics::{bisect, percentile};
 /// assert!(half_n < surely_n && surely_n < 0.02);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub struct LightestTouch<'a> {
+pub struct DetectableForce<'a> {
     rate: FalseAlarmRate,
     noise_sds: Vec<(usize, f64)>,
     /// Standardized change by a contact.
@@ -38,7 +38,7 @@ struct Rule {
 
 impl Rule {
     fn new(detection: Detection, weights: Vec<f64>) -> Self {
-        Self { needed: LightestTouch::FOUND.map(|found| detection.signal(found)), weights }
+        Self { needed: DetectableForce::FOUND.map(|found| detection.signal(found)), weights }
     }
 
     fn length(&self, change: &[f64]) -> f64 {
@@ -56,10 +56,10 @@ pub struct TouchSummary {
     /// Position and value of the maximum.
     pub worst: (Position, f64),
     /// Number of positions without detection.
-    pub without: usize,
+    pub undetected: usize,
 }
 
-impl<'a> LightestTouch<'a> {
+impl<'a> DetectableForce<'a> {
     /// Detection probabilities.
     pub const FOUND: [f64; 2] = [0.5, 0.95];
     const MOST_N: f64 = 1e6;
@@ -76,7 +76,7 @@ impl<'a> LightestTouch<'a> {
 
     /// Adds the test against the scatter of untouched rows.
     #[must_use]
-    pub fn beyond(mut self, scatter: &UntouchedScatter) -> Self {
+    pub fn with_scatter(mut self, scatter: &UntouchedScatter) -> Self {
         let weight = |(channel, noise_sd): &(usize, f64)| match scatter.sd.get(*channel) {
             Some(scatter_sd) if *scatter_sd > 0.0 => noise_sd / scatter_sd,
             _ => 0.0,
@@ -95,7 +95,7 @@ impl<'a> LightestTouch<'a> {
         self.rate
     }
 
-    /// Returns the forces detected with [`LightestTouch::FOUND`].
+    /// Returns the forces detected with [`DetectableForce::FOUND`].
     pub fn forces_at(&self, position: Position) -> [Option<f64>; 2] {
         [0, 1].map(|i| {
             let forces = self.rules.iter().map(|rule| self.force_n(position, rule, rule.needed[i]));
@@ -129,7 +129,7 @@ impl<'a> LightestTouch<'a> {
                 found: Self::FOUND[i],
                 median_n: percentile(&forces_n, 50.0)?,
                 worst: *found.last()?,
-                without: positions.len() - found.len(),
+                undetected: positions.len() - found.len(),
             })
         })
     }

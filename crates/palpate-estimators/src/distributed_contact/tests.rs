@@ -23,8 +23,10 @@ fn bells([x, y, force]: [f64; 3]) -> Vec<f64> {
     [(0.0, 0.0), (0.5, 0.1), (1.0, 0.0), (0.1, 0.6), (0.6, 0.5), (0.2, 1.0), (0.9, 0.8)].map(bell).to_vec()
 }
 
-const LINE: About = About { at: [0.4, 0.3, 2.0], ends: [(0.0, 1.0), (0.3, 0.3), (0.0, f64::INFINITY)] };
-const PLANE: About = About { at: [0.4, 0.3, 2.0], ends: [(0.0, 1.0), (0.0, 1.0), (0.0, f64::INFINITY)] };
+const LINE: BoundedContact =
+    BoundedContact { at: [0.4, 0.3, 2.0], ends: [(0.0, 1.0), (0.3, 0.3), (0.0, f64::INFINITY)] };
+const PLANE: BoundedContact =
+    BoundedContact { at: [0.4, 0.3, 2.0], ends: [(0.0, 1.0), (0.0, 1.0), (0.0, f64::INFINITY)] };
 
 fn tangent(k: usize) -> Vec<f64> {
     let moved = |by: f64| bells(std::array::from_fn(|i| PLANE.at[i] + if i == k { by } else { 0.0 }));
@@ -44,7 +46,8 @@ fn residual(of: Vec<f64>, unknowns: &[usize]) -> Vec<f64> {
 #[test]
 fn directions_are_of_unit_length_and_right_angles_to_what_a_point_changes() {
     for (about, count, tangents) in [(LINE, 1, vec![0, 2]), (PLANE, 3, vec![0, 1, 2])] {
-        let SpreadDirections { units, .. } = SpreadDirections::about(about, bells);
+        let DistributedContactDirections { units, .. } =
+            DistributedContactDirections::at_contact(about, bells);
         assert_eq!(units.len(), count);
         for (i, unit) in units.iter().enumerate() {
             assert!((dot(unit, unit) - 1.0).abs() < 1e-12);
@@ -59,8 +62,8 @@ fn directions_are_of_unit_length_and_right_angles_to_what_a_point_changes() {
 
 #[test]
 fn a_known_force_is_no_way_out_for_a_point() {
-    let known = About { ends: [LINE.ends[0], LINE.ends[1], (2.0, 2.0)], ..LINE };
-    let unit = SpreadDirections::about(known, bells).on_line().unwrap();
+    let known = BoundedContact { ends: [LINE.ends[0], LINE.ends[1], (2.0, 2.0)], ..LINE };
+    let unit = DistributedContactDirections::at_contact(known, bells).on_line().unwrap();
     assert!(dot(&unit, &tangent(0)).abs() < 1e-4);
     assert!(dot(&unit, &tangent(2)).abs() > 0.1);
 }
@@ -78,7 +81,7 @@ fn all_that_two_contacts_close_by_leave_is_along_the_directions() {
     ] {
         for (dx, dy) in ways {
             let left = residual(two(dx, dy), &tangents);
-            let directions = SpreadDirections::about(about, bells);
+            let directions = DistributedContactDirections::at_contact(about, bells);
             let share = directions.score(&left) / dot(&left, &left);
             assert!((0.98..1.0 + 1e-9).contains(&share), "{dx} {dy}: {share}");
             let opposite: Vec<f64> = left.iter().map(|r| -r).collect();
@@ -89,31 +92,33 @@ fn all_that_two_contacts_close_by_leave_is_along_the_directions() {
 }
 
 #[test]
-fn directions_that_channels_do_not_tell_are_none() {
+fn unidentifiable_directions_are_absent() {
     // Position and force use up two channels, and a force of 0 reads 0 everywhere.
-    let two = SpreadDirections::about(LINE, |at| bells(at)[..2].to_vec());
+    let two = DistributedContactDirections::at_contact(LINE, |at| bells(at)[..2].to_vec());
     assert!(two.score(&[1e3, -1e3]) == 0.0 && two.on_line().is_none());
-    let nothing = About { at: [0.4, 0.3, 0.0], ..PLANE };
-    assert_eq!(SpreadDirections::about(nothing, bells).score(&[1.0; 7]), 0.0);
-    let ends = About { at: [0.0, 1.0, 2.0], ..PLANE };
-    assert!(SpreadDirections::about(ends, bells).units.len() == 3);
+    let nothing = BoundedContact { at: [0.4, 0.3, 0.0], ..PLANE };
+    assert_eq!(DistributedContactDirections::at_contact(nothing, bells).score(&[1.0; 7]), 0.0);
+    let ends = BoundedContact { at: [0.0, 1.0, 2.0], ..PLANE };
+    assert!(DistributedContactDirections::at_contact(ends, bells).units.len() == 3);
 }
 
 #[test]
 fn bounds_are_the_quantiles_of_the_score() {
     // P(z > u) for u² on a line; on a plane χ² of three.
-    assert!((palpate_numerics::normal_cdf(-spread_bound(1).sqrt()) - SPREAD_RATE).abs() < 1e-9);
-    assert!((palpate_numerics::chi_squared_survival(spread_bound(2), 3) - SPREAD_RATE).abs() < 1e-9);
+    assert!((palpate_numerics::normal_cdf(-distributed_contact_bound(1).sqrt()) - SPREAD_RATE).abs() < 1e-9);
+    assert!(
+        (palpate_numerics::chi_squared_survival(distributed_contact_bound(2), 3) - SPREAD_RATE).abs() < 1e-9
+    );
 }
 
 /// Contacts of unknown force, with readings of 5 µm noise, and a fitted locator.
-struct Told {
+struct UnknownForceCase {
     physics: Setup,
     locator: Locator,
     forces_n: [f64; 3],
 }
 
-impl Told {
+impl UnknownForceCase {
     /// Percentage of `outside_model` for one contact, and for two 50 mm apart.
     fn outside_percent(&self, readings: usize) -> [f64; 2] {
         let sensors = CleanSensors::new(self.physics.surface().model().unwrap(), self.physics.layout());
@@ -162,7 +167,7 @@ fn without_model() -> (Setup, Recording) {
 
 /// Forces are the sum over contacts: each of two has half.
 #[test]
-fn two_contacts_of_unknown_force_are_told_and_one_is_not() {
+fn two_contacts_of_unknown_force_are_detected_and_one_is_not() {
     let forces_n = [3.0, 6.0, 12.0];
     let training = Training { force_n: Some(3.0), ..Training::even(20).repeated(50) };
     let presses = line_setup().simulate(&training, 1).unwrap();
@@ -179,7 +184,7 @@ fn two_contacts_of_unknown_force_are_told_and_one_is_not() {
     let most = 100.0 * (OUTSIDE_MODEL_RATE + SPREAD_RATE);
     for (locator, least) in fitted {
         let name = locator.kind();
-        let told = Told { physics: line_setup(), locator, forces_n };
+        let told = UnknownForceCase { physics: line_setup(), locator, forces_n };
         let [one, two] = told.outside_percent(3000);
         println!("{name}: {one} % of one contact, {two} % of two");
         assert!(one <= most + 0.2 && two >= least, "{name}: {one} and {two} %");
@@ -188,7 +193,7 @@ fn two_contacts_of_unknown_force_are_told_and_one_is_not() {
     let locator = influence()
         .fit_without_interval_check(FitTask::new(&bench.setup.clone().unknown_force(), &bench.simulate(1)))
         .unwrap();
-    let [one, two] = Told { physics: bench.setup, locator, forces_n }.outside_percent(1500);
+    let [one, two] = UnknownForceCase { physics: bench.setup, locator, forces_n }.outside_percent(1500);
     println!("plate: {one} % of one contact, {two} % of two");
     assert!(one <= most + 0.3 && two >= 12.5, "plate: {one} and {two} %");
 }

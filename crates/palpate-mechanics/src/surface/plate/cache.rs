@@ -13,11 +13,11 @@ const MOST_BYTES: usize = 128_000_000;
 type Key = (SensorKind, [u64; 2]);
 
 #[derive(Default)]
-pub(super) struct Kept {
+pub(super) struct InfluenceCache {
     functions: Mutex<HashMap<Key, Arc<PlateInfluence>>>,
 }
 
-impl Kept {
+impl InfluenceCache {
     /// Returns functions, by one call of `solve` for missing ones.
     pub fn of_all<E>(
         &self,
