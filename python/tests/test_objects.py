@@ -167,7 +167,7 @@ def test_ctrl_c_stops_a_fit(presses, heeds_ctrl_c):
         slow_fit(presses, progress=False)
     stopped = time.perf_counter()
     thread.join()
-    # Other work on the machine may hold the threads up; what is typical is in docs/validation/tables/python.md.
+    # Other work on the machine may hold the threads up; python/benchmarks/interrupts.py prints typical times.
     assert stopped - sent[0] < 1.0
 
 

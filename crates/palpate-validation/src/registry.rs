@@ -2,8 +2,9 @@
 
 use crate::experiment::Experiment;
 use crate::{
-    beam_ends, drift_and_creep, false_alarms, influence_sources, load_patches, load_profiles, measured_edges,
-    moving_contacts, one_weight, plate_edges, plate_limit, real_benches, statuses, strips, weighed,
+    beam_ends, comparisons, designs, drift_and_creep, false_alarms, influence_sources, load_patches,
+    load_profiles, measured_edges, mechanics, moving_contacts, one_weight, plate_edges, plate_limit,
+    real_benches, statuses, strips, studies, weighed,
 };
 use anyhow::{Context, Result};
 
@@ -29,6 +30,16 @@ pub const EXPERIMENTS: &[Experiment] = &[
     weighed::EXPERIMENT,
     moving_contacts::EXPERIMENT,
     drift_and_creep::EXPERIMENT,
+    studies::PRESS_SPACING,
+    studies::SENSING_POSITIONS,
+    studies::SENSOR_KINDS,
+    designs::SENSOR_LAYOUTS,
+    designs::NETWORK_POSITIONS,
+    comparisons::ELLIOTT,
+    comparisons::DEAD_AREAS,
+    mechanics::SUPPORTED_BEAMS,
+    mechanics::DIGIT_LIMIT,
+    mechanics::PLATE_MESH,
 ];
 
 /// The experiments of these names; all of them without a name.

@@ -265,7 +265,7 @@ impl<'a> Profiler<'a> {
         if let Some(centre) = &mut centre {
             match &even {
                 Some(even) => {
-                    self.apply_uniform_loads(even, &mut patches, (centre, &mut total_n, &mut bounds))
+                    self.apply_uniform_loads(even, &mut patches, (centre, &mut total_n, &mut bounds));
                 }
                 None => self.take_bounds(&shapes, &mut patches, centre),
             }
