@@ -1,8 +1,6 @@
-//! Network addresses.
-
 use std::fmt;
 
-/// A host and a port.
+/// Host and port.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Address {
     /// Name or address; IPv6 without brackets.

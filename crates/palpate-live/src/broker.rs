@@ -1,5 +1,3 @@
-//! Address and login of an MQTT broker.
-
 use crate::address::Address;
 use crate::login::{Login, PASSWORD_VARIABLE};
 use rumqttc::{ConnectReturnCode, ConnectionError};
@@ -29,7 +27,6 @@ pub fn broker_and_login(
     Ok((Address::read(broker, Some(MQTT_PORT), example)?, Some(login)))
 }
 
-/// Returns the message for a failed connection.
 pub fn explain(broker: &str, error: &ConnectionError) -> String {
     match error {
         ConnectionError::ConnectionRefused(

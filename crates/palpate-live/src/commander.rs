@@ -41,7 +41,7 @@ impl Commander {
     /// Queues a command without waiting.
     ///
     /// # Errors
-    /// The device is disconnected, or too many commands wait.
+    /// A disconnected device, or too many waiting commands.
     pub fn send(&self, command: &[u8]) -> Result<(), SendError> {
         if !self.open.load(Ordering::Relaxed) {
             return Err(SendError::Away);

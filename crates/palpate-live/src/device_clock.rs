@@ -21,7 +21,7 @@ const WRAPS: [Duration; 2] = [Duration::from_micros(1 << 32), Duration::from_mil
 /// Largest difference between steps in seconds, beyond [`GREATEST_DRIFT`], of clocks that were not set.
 const STEP_S: f64 = 2.0;
 
-/// Returns the time between readings, with a wrap-around; `None` for a clock that was set back.
+/// Time between readings, with a wrap-around; `None` for a clock that was set back.
 pub fn step(from: Duration, to: Duration) -> Option<Duration> {
     const END: u32 = 16;
     let around = |wrap: &Duration| from < *wrap && *wrap - from < *wrap / END && to < *wrap / END;
@@ -76,7 +76,7 @@ struct Bin {
 }
 
 impl DeviceClock {
-    /// Returns the host time of a reading, at most its arrival. A clock that was set restarts the estimation.
+    /// Host time of a reading, at most its arrival. A clock that was set restarts the estimation.
     pub fn host_time(&mut self, device: Duration, arrival: Duration) -> Duration {
         if !self.epoch.as_mut().is_some_and(|epoch| epoch.step(device, arrival)) {
             self.epoch = Some(Epoch::new(device, arrival));

@@ -3,12 +3,12 @@
 use palpate_estimators::estimate_record::ContactRecord;
 use serde::Serialize;
 
-/// An event with its time.
+/// Event with its time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EventRecord {
-    /// Seconds since 1970-01-01 00:00 UTC.
+    /// Unix time in seconds.
     pub time_s: f64,
-    /// The event.
+    /// Event.
     #[serde(flatten)]
     pub event: Event,
 }
@@ -59,9 +59,9 @@ pub enum Event {
         /// Duration in seconds.
         seconds: f64,
     },
-    /// A reading that no single contact explains.
+    /// Reading that no single contact explains.
     OutsideModel,
-    /// A second contact.
+    /// Second contact.
     SecondContact {
         /// Position and force.
         #[serde(flatten)]
@@ -83,12 +83,12 @@ pub enum Event {
     },
     /// A rule has raised an alarm.
     Alarm {
-        /// Name of the rule.
+        /// Rule.
         name: String,
         /// Text.
         text: String,
     },
-    /// A mark of a user.
+    /// Mark of a user.
     Mark {
         /// Text.
         text: String,

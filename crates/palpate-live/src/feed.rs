@@ -65,7 +65,7 @@ impl FeedWatch {
         }
     }
 
-    /// Returns a report of missing readings, once per gap.
+    /// Reports missing readings, once per gap.
     pub fn report(&mut self, now: Duration, frames: &FrameReader) -> Option<String> {
         let since = now.saturating_sub(self.since);
         let bad = frames.bad_in_a_row();
@@ -80,7 +80,7 @@ impl FeedWatch {
         Some(format!("no readings: {}", self.reason(frames)))
     }
 
-    /// Returns the fault of a feed without readings at its end.
+    /// Fault of a feed without readings at its end.
     pub fn fault(&self, frames: &FrameReader) -> Option<String> {
         let is_cut_short = match &self.state {
             FeedState::Lost(_) => true,

@@ -5,9 +5,9 @@ use crate::stamp::Stamp;
 /// Input of a session.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Input {
-    /// An arrival.
+    /// Arrival.
     Arrived(TimedArrival),
-    /// A command.
+    /// Command.
     Command(Command),
     /// End of the session.
     Stop,
@@ -34,12 +34,12 @@ pub enum Arrival {
     Ended,
 }
 
-/// An arrival with its instant.
+/// Arrival with its instant.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TimedArrival {
     /// Instant of the last byte.
     pub at: Stamp,
-    /// The arrival.
+    /// Arrival.
     pub arrival: Arrival,
 }
 
@@ -54,7 +54,7 @@ pub enum Command {
     Trouble(String),
     /// Raise an alarm.
     Alarm {
-        /// Name of the rule.
+        /// Rule.
         name: String,
         /// Text.
         text: String,

@@ -58,7 +58,7 @@ impl Login {
         Ok(Self { user, password })
     }
 
-    /// Returns user and password; an unset environment variable gives an empty password.
+    /// User and password; the latter is empty for an unset environment variable.
     ///
     /// # Errors
     /// An unreadable file.
@@ -84,7 +84,7 @@ impl Login {
     }
 }
 
-/// The percent-encoded user name.
+/// Percent-encoded user name.
 impl fmt::Display for Login {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.user.bytes().try_for_each(|byte| match byte {

@@ -19,10 +19,10 @@ const BINARY_SAMPLE: usize = 2048;
 /// Valid checksums that establish the number of channels.
 const BINARY_FRAMES: usize = 3;
 
-/// A received line.
+/// Received line.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RawLine {
-    /// Seconds since 1970-01-01 00:00 UTC.
+    /// Unix time in seconds.
     pub time_s: f64,
     /// Text, escaped and cut.
     pub text: String,
@@ -44,13 +44,13 @@ pub struct ChannelValues {
 /// State of a monitor for JSON.
 #[derive(Clone, Debug, Serialize)]
 pub struct MonitorRecord {
-    /// Name of the connected source.
+    /// Connected source.
     pub source: Option<String>,
     /// Cause of missing readings.
     pub problem: Option<String>,
-    /// Number of bytes.
+    /// Bytes.
     pub bytes: u64,
-    /// Number of readings.
+    /// Readings.
     pub readings: u64,
     /// Readings per second.
     pub rate_hz: f64,
@@ -236,7 +236,7 @@ impl Monitor {
         }
     }
 
-    /// Returns the current state.
+    /// Current state.
     pub fn record(&self, now: Duration) -> MonitorRecord {
         let recent = self.arrivals.iter().filter(|(at, _)| now.saturating_sub(*at) <= RATE_OVER);
         let (first, count) =
@@ -297,7 +297,7 @@ impl Monitor {
             .collect()
     }
 
-    /// Returns whether the board names its values.
+    /// True if the board names its values.
     pub fn is_named(&self) -> bool {
         self.detected.as_ref().is_some_and(|detected| detected.named)
     }

@@ -39,8 +39,7 @@ pub fn check_pace(estimation: &Estimation, from: &SourceUrl) -> Result<(), PaceE
     }
 }
 
-/// Runs a session to the end of source, senders or stop. Returns the fault of the feed, which is also an
-/// event.
+/// Runs a session to the end of source, senders or stop. Returns the fault of the feed, also an event.
 pub fn run(
     session: &mut Session,
     clock: HostClock,

@@ -40,7 +40,7 @@ use toml::Spanned;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rules(Vec<Rule>);
 
-/// A rule.
+/// Rule.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rule {
     /// Name.
@@ -81,7 +81,7 @@ pub struct RulesByAction {
 /// Condition of a rule.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Condition {
-    /// A contact within bands.
+    /// Contact within bands.
     Contact {
         /// Band of x in metres.
         x_m: Option<(f64, f64)>,
@@ -92,7 +92,7 @@ pub enum Condition {
         /// Time within the bands, and outside before a repetition.
         hold: Duration,
     },
-    /// An event of this name.
+    /// Event of this name.
     Event(String),
 }
 
@@ -150,7 +150,7 @@ struct RuleIn {
 }
 
 impl RuleError {
-    /// Returns the problem with its line.
+    /// Problem with its line.
     pub fn with_line(&self, text: &str) -> String {
         match self.span.as_ref().and_then(|span| text.get(..span.start)) {
             Some(before) => format!("line {}: {}", before.matches('\n').count() + 1, self.problem),
@@ -182,8 +182,8 @@ impl Rules {
         &self.0
     }
 
-    /// First rule with a band of forces, for a locator that
-    /// [estimates the force](palpate_estimators::estimator::Locator::estimates_force).
+    /// First rule with a band of forces, for a locator that [estimates the
+    /// force](palpate_estimators::estimator::Locator::estimates_force).
     pub fn first_of_force(&self) -> Option<&Rule> {
         let asks = |rule: &&Rule| matches!(rule.condition, Condition::Contact { force_n: Some(_), .. });
         self.0.iter().find(asks)
@@ -211,7 +211,7 @@ impl Rules {
     /// Checks that all rules raise alarms that this locator supports.
     ///
     /// # Errors
-    /// A message about the first other rule.
+    /// Message about the first other rule.
     pub fn check_alarms(&self, locator: &Locator) -> Result<(), String> {
         if let Some(rule) = self.0.iter().find(|rule| !matches!(rule.action, Action::Alarm(_))) {
             return Err(format!(
@@ -452,7 +452,7 @@ struct State {
 }
 
 impl RuleWatch {
-    /// Returns the initial state.
+    /// Initial state.
     pub fn new(rules: Rules) -> Self {
         Self { states: vec![State::default(); rules.0.len()], rules }
     }

@@ -7,12 +7,12 @@ use palpate_mechanics::surface::Extent;
 use serde::Serialize;
 use std::time::Duration;
 
-/// A reading with its estimate.
+/// Reading with its estimate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sample {
     /// Number in the session, from 0.
     pub number: u64,
-    /// Increasing time in ns since 1970-01-01 00:00 UTC, by the board's clock if available.
+    /// Increasing Unix time in ns, by the board's clock if available.
     pub unix_ns: u64,
     /// Instant of the last byte.
     pub arrived: Duration,
@@ -29,7 +29,7 @@ pub struct Sample {
 pub struct SampleRecord {
     /// Number in the session, from 0.
     pub number: u64,
-    /// Seconds since 1970-01-01 00:00 UTC.
+    /// Unix time in seconds.
     pub time_s: f64,
     /// Received reading in the units of the channels.
     pub reading: Vec<f64>,
@@ -42,7 +42,7 @@ pub struct SampleRecord {
 }
 
 impl SampleRecord {
-    /// Returns the record of a sample.
+    /// Record of a sample.
     pub fn new(sample: &Sample, channels: &[Channel], extent: Extent) -> Self {
         let values = sample.reading.iter().zip(channels);
         Self {
@@ -55,7 +55,7 @@ impl SampleRecord {
     }
 }
 
-/// Returns xx, xy, yy of a position on a plane in mm², if finite.
+/// xx, xy, yy of a position on a plane in mm², if finite.
 pub fn covariance_mm2(estimate: &Estimate, extent: Extent) -> Option<[f64; 3]> {
     let uncertainty = estimate.contact.uncertainty.filter(|_| extent.width_m().is_some())?;
     let [xx, xy, _, yy, ..] = uncertainty.covariance;

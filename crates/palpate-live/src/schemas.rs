@@ -1,5 +1,3 @@
-//! Topics with JSON schemas and messages.
-
 use crate::sample::{Sample, covariance_mm2};
 use palpate_estimators::estimate_record::EstimateRecord;
 use palpate_mechanics::surface::Extent;
@@ -77,8 +75,7 @@ impl Serialize for Values<'_> {
     }
 }
 
-/// Returns `number` of `value = number * factor` to the last bit: the quotient or a neighbouring
-/// floating-point number.
+/// `number` of `value = number * factor` to the last bit: the quotient or a neighbouring floating-point number.
 pub fn in_board_units(value: f64, factor: f64) -> f64 {
     let quotient = value / factor;
     let near = [quotient, quotient.next_down(), quotient.next_up()];

@@ -2,12 +2,12 @@
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// An instant by both clocks of the host.
+/// Instant by both clocks of the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stamp {
     /// Time since the start of the [`HostClock`].
     pub elapsed: Duration,
-    /// Nanoseconds since 1970-01-01 00:00 UTC, by a clock that may be set.
+    /// Unix time in ns, by a clock that may be set.
     pub unix_ns: u64,
 }
 
@@ -25,7 +25,7 @@ impl HostClock {
         Self::with_speed(1)
     }
 
-    /// Starts clocks with a monotonic clock of a simulation, `speed` times as fast.
+    /// Starts clocks; the monotonic clock is `speed` times as fast, for a simulation.
     pub fn with_speed(speed: u32) -> Self {
         Self { start: Instant::now(), speed }
     }
@@ -35,7 +35,7 @@ impl HostClock {
         self.start.elapsed().saturating_mul(self.speed)
     }
 
-    /// Returns the real time of `span`.
+    /// Real time of `span`.
     pub fn real_time(&self, span: Duration) -> Duration {
         span / self.speed.max(1)
     }

@@ -1,5 +1,3 @@
-//! Drawing of a loaded beam as SVG text.
-
 use super::drawing::axis::plain;
 use super::drawing::geometry::{Point, Rect};
 use super::drawing::svg::{Anchor, Colour, GRID, INK, Label, QUIET_INK, REFERENCE, Svg, palette};
@@ -9,9 +7,9 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::{Beam, BeamSection, BeamSupportKind, SupportedBeam, Surface};
 
-/// Share of the length, off the middle, so that the shape is visibly asymmetric.
+/// Off the middle, for a visibly asymmetric shape.
 const DRAWN_LOAD: f64 = 0.35;
-/// Candidate positions on other supports; the one with the largest bending is used.
+/// On other supports; the one with the largest bending is used.
 const DRAWN_LOADS: [f64; 5] = [DRAWN_LOAD, 0.2, 0.5, 0.65, 0.8];
 const SHAPE_STEPS: u32 = 200;
 
@@ -60,19 +58,18 @@ pub(super) fn supported_beam_drawing(
     (drawing, load)
 }
 
-/// Positions are from the left end and clamped to the ends.
+/// Positions from the left end, clamped to the ends.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct BeamDrawing {
     pub length_mm: f64,
     /// Position in millimetres and kind.
     pub supports: Vec<(f64, BeamSupportKind)>,
-    /// End and thickness of each stretch, in millimetres, from left to right; empty for one
-    /// thickness.
+    /// End and thickness of each stretch in mm, from left to right; empty for one thickness.
     pub steps: Vec<(f64, f64)>,
     pub sensors_mm: Vec<f64>,
     pub load_mm: f64,
     pub load_label: String,
-    /// (position, deflection) in millimetres; downward deflections are negative.
+    /// (position, deflection) in mm, downward negative.
     pub deflection_mm: Vec<(f64, f64)>,
     pub width_px: u32,
 }
@@ -97,8 +94,7 @@ impl BeamDrawing {
         }
     }
 
-    /// The SVG states the beam's length, the largest deflection, both in mm, and the round factor
-    /// of exaggeration.
+    /// States the length, the largest deflection, both in mm, and the factor of exaggeration.
     pub fn svg(&self) -> String {
         let frame = Frame::new(self);
         let (numbers, number_rows) = number_labels(self, &frame);
@@ -122,7 +118,7 @@ struct Frame {
     length_mm: f64,
     px_per_mm: f64,
     exaggeration: f64,
-    /// Position of the largest deflection in mm; `None` without deflection.
+    /// Position of the largest deflection in mm, if any.
     deepest: Option<(f64, f64)>,
     shape: Vec<Point>,
 }
@@ -324,7 +320,7 @@ fn double_arrow(svg: &mut Svg, start: Point, end: Point, colour: Colour) {
     }
 }
 
-/// Draws a triangle with its tip at `tip`, along the unit vector `along`.
+/// Triangle with its tip at `tip`, along the unit vector `along`.
 fn arrow_head(svg: &mut Svg, tip: Point, along: Point, length: f64, colour: Colour) {
     let back = (tip.0 - along.0 * length, tip.1 - along.1 * length);
     let aside = (-along.1 * length * 0.4, along.0 * length * 0.4);

@@ -1,5 +1,3 @@
-//! Drawings of the bench, and of the sensors of layouts.
-
 use maud::html;
 
 use super::beam_drawing::{beam_drawing, supported_beam_drawing};
@@ -10,7 +8,7 @@ use super::{Axis, Chart, Mark, Marker, Series};
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::SurfaceSpec;
 
-/// Draws the surface bent by `force_n`; `None` if it cannot be drawn.
+/// Surface bent by `force_n`, if drawable.
 pub(super) fn bench_figure(
     what: &str,
     surface: &SurfaceSpec,

@@ -1,5 +1,3 @@
-//! Report of a comparison: the errors of all estimators, and the limit.
-
 use maud::{Markup, html};
 
 use super::error_lines::{in_milli, limit_in_words, limit_line};
@@ -14,10 +12,10 @@ use palpate_mechanics::surface::Extent;
 
 /// Stretches over which errors are averaged.
 const STRETCHES: usize = 40;
-/// Further estimators are in the table only.
+/// Further estimators are only in the table.
 const MOST_MAPS: usize = 9;
 
-/// Contents of a comparison's report.
+/// Contents of the report.
 #[derive(Clone, Copy)]
 pub struct ComparisonReport<'a> {
     /// Page title.
@@ -28,15 +26,15 @@ pub struct ComparisonReport<'a> {
     pub trials: &'a str,
     /// Estimators, best first.
     pub comparisons: &'a [Comparison],
-    /// Unsuitable kinds of estimators, with the reasons.
+    /// Unsuitable estimators, with reasons.
     pub omitted: &'a [(&'static str, String)],
-    /// Largest error in metres that counts for the effective length.
+    /// Largest error in metres for the effective length.
     pub tolerance_m: f64,
     /// Seed of simulation and fits.
     pub seed: u64,
 }
 
-/// Returns `report.html` and its figures as SVG files.
+/// `report.html` and SVG figures.
 pub fn comparison_report(report: &ComparisonReport) -> Vec<ReportFile> {
     let (heading, errors) = match report.extent() {
         Extent::Line { .. } => ("Errors along the surface", report.along_figure()),

@@ -1,5 +1,3 @@
-//! Report of dead areas: errors between sensors, by estimator and number of sensors.
-
 use maud::{Markup, html};
 
 use super::error_lines::tolerance_mark;
@@ -8,7 +6,7 @@ use super::page::{Columns, Figure, Page, ReportFile, Section, Table};
 use super::{Axis, Chart, Series};
 use palpate_studies::dead_areas::{DeadAreaResults, DeadAreaRow, DeadAreas};
 
-/// Returns `report.html` and its figures as SVG files.
+/// `report.html` and SVG figures.
 pub fn dead_areas_report(study: &DeadAreas, findings: &DeadAreaResults) -> Vec<ReportFile> {
     let report = DeadAreasReport { study, findings };
     let folded = study.counts.iter().map(|count| report.folded_figure(*count));

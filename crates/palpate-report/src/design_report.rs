@@ -1,5 +1,3 @@
-//! Report of a sensor design: layouts by several methods and their scores.
-
 use maud::{Markup, html};
 
 use super::bench_figures::{bench_figure, sites_chart};
@@ -22,7 +20,7 @@ use palpate_mechanics::surface::Extent;
 const CELLS: f64 = 1600.0;
 const CELLS_A_SIDE: std::ops::RangeInclusive<usize> = 5..=160;
 
-/// Contents of a sensor design's report.
+/// Contents of the report.
 #[derive(Clone, Copy)]
 pub struct SensorDesignReport<'a> {
     /// Page title.
@@ -33,15 +31,15 @@ pub struct SensorDesignReport<'a> {
     pub problem: &'a SensorProblem<'a>,
     /// Designed layouts.
     pub designed: &'a [AssessedLayout],
-    /// Errors of simulated calibrations, for some of the layouts.
+    /// Errors of simulated calibrations, for some layouts.
     pub verified: &'a [(Method, Verification)],
-    /// Layouts with other numbers of sensors; may be empty.
+    /// Layouts with other numbers of sensors.
     pub counts: &'a [CountPoint],
     /// Seed of searches and simulations.
     pub seed: u64,
 }
 
-/// Returns `report.html` and its figures as SVG files.
+/// `report.html` and SVG figures.
 pub fn sensor_design_report(report: &SensorDesignReport) -> Vec<ReportFile> {
     let layouts = Section::new("layouts", "The layouts").table(report.table()).table(report.places());
     let limit = Section::new("limit", "The limit with the best of them");
@@ -65,7 +63,7 @@ pub fn sensor_design_report(report: &SensorDesignReport) -> Vec<ReportFile> {
 }
 
 impl<'a> SensorDesignReport<'a> {
-    /// Even layout, or the present one if its sensors are kept.
+    /// Even layout; the present one if sensors are kept.
     fn even(&self) -> Option<&'a AssessedLayout> {
         self.problem.reference(self.designed)
     }

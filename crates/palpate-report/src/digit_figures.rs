@@ -1,5 +1,3 @@
-//! Figures of a flexible digit: shapes, force limit, and errors of the linear theory.
-
 use maud::html;
 
 use super::error_lines::in_milli;
@@ -21,7 +19,7 @@ const SHAPE_STEPS: u32 = 120;
 const FORCES: u32 = 60;
 const MARGIN: f64 = 0.06;
 
-/// Draws the straight finger and its shape under `force_n` at three places, to scale.
+/// Straight and under `force_n` at three places, to scale.
 pub(super) fn shapes_figure(what: &str, digit: &Digit, layout: &Layout, force_n: f64) -> Figure {
     let l = digit.length_m();
     let points = |contact: Contact| {
@@ -70,8 +68,7 @@ pub(super) fn force_limit_figure(unknown: &LimitCurve) -> Figure {
     Figure::chart(&chart, caption)
 }
 
-/// Errors of the linear theory without noise, relative to the exact limit; empty if no estimator
-/// suits the bench.
+/// Errors without noise, relative to the exact limit; empty if no estimator suits the bench.
 pub(super) fn linear_theory_figures(setup: &Setup, limit: &CramerRaoBound, digit: &Digit) -> Vec<Figure> {
     let Some(theory) = LinearTheory::new(setup, digit) else { return Vec::new() };
     let at_limit = |contact: Contact| {

@@ -1,6 +1,3 @@
-//! Report of Elliott's chain: errors by number of components, against the influence locator and the
-//! limit.
-
 use maud::{Markup, html};
 
 use super::numbers::{NOTHING, mm, number, quantile_range, whole};
@@ -9,7 +6,7 @@ use super::{Axis, Chart, ErrorPoint, Marker, Series};
 use palpate_estimators::evaluation::Quantiles;
 use palpate_studies::elliott::{Chain, ChainRow, Elliott, ElliottResults, INNER};
 
-/// Returns `report.html` and its figures as SVG files.
+/// `report.html` and SVG figures.
 pub fn elliott_report(study: &Elliott, findings: &ElliottResults) -> Vec<ReportFile> {
     let report = ElliottReport { study, findings };
     let sections = vec![
@@ -117,7 +114,7 @@ impl ElliottReport<'_> {
         Series::error_bars(label, colour, points, Marker::Circle)
     }
 
-    /// Chains that do not depend on the number of components.
+    /// Chains independent of the number of components.
     fn across(&self, error: fn(&ChainRow) -> Option<Quantiles>) -> impl Iterator<Item = Series> {
         let chains = [
             (Chain::Readings, "network on all readings", 1),

@@ -1,5 +1,3 @@
-//! Error lines along a surface: medians with bands, tolerance and limit.
-
 use super::numbers::mm;
 use super::{BandPoint, Chart, Mark, Series};
 use palpate_estimators::evaluation::Quantiles;
@@ -44,7 +42,7 @@ pub(super) fn limit_line_or_assumed(setup: &Setup) -> Option<Series> {
     }
 }
 
-/// Mean error of the best unbiased estimator of an arm, in mm; `None` without a limit.
+/// Mean error of the best unbiased estimator of an arm, in mm.
 pub(super) fn limit_line_of_arm(setup: &Setup, force_n: f64, colour: usize, label: &str) -> Option<Series> {
     let limit = setup.cramer_rao_bound().ok()?;
     let force = setup.force();

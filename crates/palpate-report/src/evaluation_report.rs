@@ -1,5 +1,3 @@
-//! Report of a locator's errors.
-
 use maud::{Markup, html};
 
 use super::error_lines::{banded, in_milli, limit_in_words, limit_line, tolerance_mark};
@@ -21,7 +19,7 @@ use palpate_rig::Rig;
 /// More positions are drawn as a line.
 const MOST_MARKERS: usize = 80;
 
-/// Contents of an evaluation's report.
+/// Contents of the report.
 #[derive(Clone, Copy, Debug)]
 pub struct EvaluationReport<'a> {
     /// Page title.
@@ -32,9 +30,9 @@ pub struct EvaluationReport<'a> {
     pub evaluation: &'a Evaluation,
     /// Origin of the located readings.
     pub recording: &'a Provenance,
-    /// Portions of the surface with errors of their own.
+    /// Portions with errors of their own.
     pub portions: &'a [Portion],
-    /// Largest error in metres that counts for the effective length.
+    /// Largest error in metres for the effective length.
     pub tolerance_m: f64,
 }
 
@@ -54,7 +52,7 @@ pub enum EstimateOrigin<'a> {
     },
 }
 
-/// Returns `report.html` and its figures as SVG files.
+/// `report.html` and SVG figures.
 pub fn evaluation_report(report: &EvaluationReport) -> Vec<ReportFile> {
     let (heading, errors) = match report.extent() {
         Extent::Line { .. } => ("Errors along the surface", report.error_figure()),
@@ -211,7 +209,7 @@ impl EvaluationReport<'_> {
         Axis::linear(label).from_to(0.0, self.evaluation.extent.length_m() * 1e3)
     }
 
-    /// A marker per reading, or for many readings medians with a band.
+    /// Marker per reading; for many readings medians with a band.
     fn estimates(
         &self,
         label: &str,

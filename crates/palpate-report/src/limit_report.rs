@@ -1,5 +1,3 @@
-//! Report of a bench's limit: the least possible error by position.
-
 use maud::{Markup, html};
 
 use super::bench_figures::bench_figure;
@@ -23,7 +21,7 @@ const MOST_LENGTHS: f64 = 10.0;
 const CELLS: f64 = 2000.0;
 const CELLS_A_SIDE: std::ops::RangeInclusive<usize> = 5..=200;
 
-/// Contents of a limit's report.
+/// Contents of the report.
 #[derive(Clone, Copy)]
 pub struct LimitReport<'a> {
     /// Page title.
@@ -32,13 +30,13 @@ pub struct LimitReport<'a> {
     pub setup: &'a Setup,
     /// Limit.
     pub limit: &'a CramerRaoBound<'a>,
-    /// Limit over the surface for a known force.
+    /// Limit for a known force.
     pub known_force: &'a LimitCurve,
-    /// Limit over the surface for an unknown force.
+    /// Limit for an unknown force.
     pub unknown_force: &'a LimitCurve,
-    /// Knowledge of the force on this bench, which the warnings assume.
+    /// Knowledge of the force, which the warnings assume.
     pub force: Force,
-    /// Warnings of the limit.
+    /// Warnings.
     pub warnings: &'a [LimitWarning],
     /// Positions for the table.
     pub listed: &'a [Position],
@@ -46,7 +44,7 @@ pub struct LimitReport<'a> {
     pub touch: &'a DetectableForce<'a>,
 }
 
-/// Returns `report.html` and its figures as SVG files.
+/// `report.html` and SVG figures.
 ///
 /// ```
 /// use palpate_estimators::{influence::Influence, setup::Setup};
@@ -168,7 +166,7 @@ impl LimitReport<'_> {
         Figure::chart(&chart, caption)
     }
 
-    /// Zones of the warnings; with `beyond`, also a line at the length of the surface.
+    /// Zones of the warnings; with `beyond`, also the length of the surface.
     fn marks(&self, beyond: bool) -> Vec<Mark> {
         let length_m = self.known_force.extent.length_m();
         let label = format!("length of the surface, {} mm", mm(length_m));
@@ -246,7 +244,7 @@ impl LimitReport<'_> {
             .caption(caption)
     }
 
-    /// Summary for the higher detection probability.
+    /// For the higher detection probability.
     fn confident_summary(&self) -> Option<TouchSummary> {
         let positions: Vec<Position> = self.known_force.points.iter().map(|point| point.position).collect();
         let [_, surely] = self.touch.summaries(&positions);

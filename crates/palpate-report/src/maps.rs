@@ -1,5 +1,3 @@
-//! Maps of errors and limits over a plane.
-
 use maud::{Markup, html};
 
 use super::numbers::number;
@@ -17,7 +15,7 @@ const MOST_SIDE: usize = 60;
 /// Cells per position above which most cells would be empty.
 const SPARSE: usize = 4;
 
-/// Median errors of locators, and the limit, on the scale of the errors.
+/// Median errors, and the limit on their scale.
 pub(super) fn error_map(
     setup: &Setup,
     title: &str,
@@ -76,7 +74,7 @@ fn error_cells(evaluations: &[(&str, &Evaluation)], extent: Extent) -> Cells {
     Cells::nearly_square(extent, 0.5 * places.len() as f64, 2..=MOST_SIDE)
 }
 
-/// Figure of the bound in mm; NaN without a bound.
+/// In mm; NaN without a bound.
 pub(super) fn limits_mm(
     limit: &CramerRaoBound,
     cells: &Cells,

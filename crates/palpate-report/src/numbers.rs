@@ -1,5 +1,3 @@
-//! Numbers in a form for readers.
-
 use palpate_estimators::evaluation::{Portion, Quantiles};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;

@@ -9,7 +9,7 @@ use super::{Chart, HeatMap, chart_to_svg, heat_map_to_svg};
 
 const STYLE: &str = include_str!("page.css");
 
-/// A file of a report.
+/// File of a report.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReportFile {
     /// Name in the report's folder: "report.html", "figure-2.svg".
@@ -26,7 +26,6 @@ pub(crate) struct Page {
     source: Markup,
 }
 
-/// Part of a page with a heading and an anchor.
 pub(crate) struct Section {
     id: &'static str,
     heading: &'static str,
@@ -70,10 +69,10 @@ impl Section {
 }
 
 pub(crate) struct Figure {
-    /// Alternative text for readers who cannot see the figure.
+    /// For readers who cannot see the figure.
     alternative: String,
     svg: String,
-    /// Drawing for a phone's screen, 360 pixels wide.
+    /// For a phone, 360 pixels wide.
     narrow_svg: String,
     caption: Markup,
 }
@@ -122,12 +121,12 @@ impl Figure {
 pub(crate) struct Table {
     caption: Markup,
     columns: Vec<Column>,
-    /// The first cell of a row is its heading.
+    /// The first cell is the heading.
     rows: Vec<Vec<Markup>>,
 }
 
 impl Table {
-    /// A row per item; the first column heads the rows.
+    /// The first column heads the rows.
     pub fn from_rows<R>(rows: impl IntoIterator<Item = R>) -> Columns<R> {
         let rows: Vec<R> = rows.into_iter().collect();
         Columns { cells: rows.iter().map(|_| Vec::new()).collect(), columns: Vec::new(), rows }
@@ -161,7 +160,7 @@ pub(crate) struct Column {
     class: &'static str,
 }
 
-/// A table that is built by columns.
+/// Table built by columns.
 pub(crate) struct Columns<R> {
     rows: Vec<R>,
     columns: Vec<Column>,
@@ -169,12 +168,11 @@ pub(crate) struct Columns<R> {
 }
 
 impl<R> Columns<R> {
-    /// Words.
     pub fn words<T: AsRef<str>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.column("text", heading, |row| text(cell(row)))
     }
 
-    /// Words without line breaks.
+    /// Without line breaks.
     pub fn short<T: AsRef<str>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.column("short", heading, |row| text(cell(row)))
     }
@@ -192,7 +190,7 @@ impl<R> Columns<R> {
         self.column("number", heading, |row| text(number(cell(row).into().unwrap_or(f64::NAN))))
     }
 
-    /// Metres, shown in millimetres; a dash for a missing length.
+    /// Metres in millimetres; a dash if missing.
     pub fn mm<T: Into<Option<f64>>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
         self.number(heading, |row| cell(row).into().map(|length_m| length_m * 1e3))
     }

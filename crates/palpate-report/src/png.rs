@@ -7,10 +7,9 @@ use std::sync::{Arc, LazyLock};
 
 const FONT_FAMILY: &str = "Noto Sans";
 const COPY_SCALE: f32 = 2.0;
-/// Longest side of a PNG in pixels.
 const MAX_SIDE_PX: u32 = 16_384;
 
-/// Error of turning an SVG into a PNG.
+/// Error of a PNG.
 #[derive(Debug, thiserror::Error)]
 pub enum PngError {
     /// The text is not an SVG document.
@@ -34,7 +33,7 @@ pub enum PngError {
     Encoding(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
 
-/// Returns the files of a report, each figure followed by its PNG copy.
+/// Adds a PNG copy after each figure.
 ///
 /// # Errors
 /// As for [`svg_to_png`].

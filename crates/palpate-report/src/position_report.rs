@@ -1,5 +1,3 @@
-//! Report of a design of training positions by several rules and searches.
-
 use maud::{Markup, html};
 
 use super::bench_figures::{row_axis, row_height};
@@ -13,7 +11,7 @@ use palpate_estimators::estimator::Cells;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::surface::Extent;
 
-/// Contents of a report of training positions.
+/// Contents of the report.
 #[derive(Clone, Copy)]
 pub struct PositionDesignReport<'a> {
     /// Page title.
@@ -28,7 +26,7 @@ pub struct PositionDesignReport<'a> {
     pub placed: &'a [VerifiedPositions],
 }
 
-/// Returns `report.html` and its figures as SVG files.
+/// `report.html` and SVG figures.
 pub fn position_design_report(report: &PositionDesignReport) -> Vec<ReportFile> {
     let positions = Section::new("positions", "The arrangements").table(report.table());
     let errors = Section::new("errors", "Where the locator is off");

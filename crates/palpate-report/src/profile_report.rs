@@ -1,5 +1,3 @@
-//! Report of a load profile: force distribution, resolution and residuals.
-
 use maud::{Markup, html};
 
 use super::maps::sensors_mm;
@@ -16,7 +14,7 @@ const KERNEL_PLACES_ON_A_PLANE: [[f64; 2]; 3] = [[0.5, 0.5], [0.25, 0.25], [0.1,
 /// From N/m to N/mm, and from Pa to kPa.
 const PER_THOUSAND: f64 = 1e-3;
 
-/// Contents of a profile's report.
+/// Contents of the report.
 #[derive(Clone, Copy)]
 pub struct ProfileReport<'a> {
     /// Page title.
@@ -27,17 +25,17 @@ pub struct ProfileReport<'a> {
     pub reading: &'a [f64],
     /// Estimated load.
     pub profile: &'a LoadProfile,
-    /// Limit of each patch; `None` if a patch is unidentifiable.
+    /// Limit of each patch; `None` if one is unidentifiable.
     pub limits: Option<&'a [PatchLimit]>,
     /// Resolution of the layout; `None` without load.
     pub resolution: Option<&'a Resolution>,
     /// Simulated loads; empty for an unknown truth.
     pub truth: &'a [UniformLoad],
-    /// Origin of the reading: a file and a line, or a rig and a seed.
+    /// Origin of the reading: file and line, or rig and seed.
     pub source: &'a str,
 }
 
-/// Returns `report.html` and its figures as SVG files.
+/// `report.html` and SVG figures.
 pub fn profile_report(report: &ProfileReport) -> Vec<ReportFile> {
     let (load, resolved) = match report.extent() {
         Extent::Line { .. } => (

@@ -1,5 +1,4 @@
-//! Report of any study: arms, layouts and errors along the surface; parts are shared with the
-//! paper's report.
+//! Report of any study; parts are shared with the paper's report.
 
 use maud::{Markup, html};
 
@@ -19,20 +18,20 @@ const MOST_BANDS: usize = 2;
 /// In rows.
 const BESIDE: f64 = 0.22;
 
-/// Contents of a study's report.
+/// Contents of the report.
 #[derive(Clone, Copy, Debug)]
 pub struct StudyReport<'a> {
     /// Study.
     pub study: &'a PreparedStudy,
     /// Fits by arm; arms may be missing.
     pub outcomes: &'a [ArmOutcome],
-    /// Figures of these outcomes.
+    /// Results of these outcomes.
     pub results: &'a StudyResults,
     /// Facts of the run.
     pub run: &'a RunFacts,
 }
 
-/// Returns `report.html` and its figures as SVG files.
+/// `report.html` and SVG figures.
 pub fn study_report(report: &StudyReport) -> Vec<ReportFile> {
     let layouts = layouts(report);
     let mut sections =
@@ -129,7 +128,7 @@ struct ComparisonRow {
     limit: fn(&ArmResults) -> Option<f64>,
 }
 
-/// Errors over all positions and in the first portion, or between and beyond training positions.
+/// Over all positions and in the first portion, or between and beyond training positions.
 fn compared(report: &StudyReport) -> Vec<ComparisonRow> {
     if report.study.evaluation_settings().training_span {
         let span = |label: &str, error: fn(&ArmResults) -> Option<Quantiles>| ComparisonRow {
@@ -321,7 +320,7 @@ impl<'a> StudyReport<'a> {
     }
 }
 
-/// Quantiles over an arm's seeds, by position in mm.
+/// Over an arm's seeds, by position in mm.
 pub(crate) fn quantiles_by_position(
     outcome: &ArmOutcome,
     figure: impl Fn(&EvaluatedContact) -> f64,
@@ -329,14 +328,14 @@ pub(crate) fn quantiles_by_position(
     outcome.by_position(figure).into_iter().map(|(x_m, spread)| (x_m * 1e3, spread)).collect()
 }
 
-/// Location errors in mm; empty without a fit.
+/// In mm; empty without a fit.
 pub(crate) fn errors(report: &StudyReport, line: &ArmLine, with_band: bool) -> Vec<Series> {
     let Some(outcome) = report.outcome(line.arm) else { return Vec::new() };
     let along = quantiles_by_position(outcome, |located| located.error_m() * 1e3);
     banded(line.label, line.colour, &along, with_band && outcome.fits.len() > 1)
 }
 
-/// Location errors in mm with the limit of the first arm; `None` without a fit.
+/// In mm, with the limit of the first arm; `None` without a fit.
 pub(crate) fn error_chart(report: &StudyReport, title: &str, arms: &[ArmLine]) -> Option<Chart> {
     let mut series: Vec<Series> = arms.iter().flat_map(|line| errors(report, line, true)).collect();
     if series.is_empty() {
@@ -434,7 +433,7 @@ fn arm_columns(report: &StudyReport) -> Vec<ArmColumn> {
     columns
 }
 
-/// Median, and beneath it the range.
+/// Median above its range.
 fn stacked(spread: Quantiles, shown: fn(f64) -> String) -> Markup {
     let [median, low, high] = [spread.median, spread.p05, spread.p95].map(shown);
     html! { (median) @if low != median || high != median { span.range { (low) "–" (high) } } }

@@ -1,5 +1,3 @@
-//! Report of the track of a contact.
-
 use maud::{Markup, html};
 
 use super::maps::in_mm;
@@ -19,7 +17,7 @@ const MOST_OF_LINE: usize = 2000;
 const PLOT_WIDTH_PX: f64 = 630.0;
 const AROUND_PLOT_PX: f64 = 130.0;
 
-/// Contents of a track's report.
+/// Contents of the report.
 #[derive(Clone, Copy, Debug)]
 pub struct TrackReport<'a> {
     /// Page title.
@@ -30,7 +28,7 @@ pub struct TrackReport<'a> {
     pub extent: Extent,
     /// Tracks of the filter or smoother.
     pub tracks: &'a [Track],
-    /// Method of tracking: "filter" or "smoother".
+    /// "filter" or "smoother".
     pub how: &'a str,
     /// True contacts of each track, if known; force 0 for no contact.
     pub truths: &'a [Vec<Contact>],
@@ -40,7 +38,7 @@ pub struct TrackReport<'a> {
     pub sweep: &'a [SpeedErrors],
 }
 
-/// Returns `report.html` and its figures as SVG files.
+/// `report.html` and SVG figures.
 pub fn track_report(report: &TrackReport) -> Vec<ReportFile> {
     let track = match report.extent {
         Extent::Line { .. } => report.track_figure(),

@@ -1,5 +1,3 @@
-//! Coverage of contacts by their distance from the end of the founding paper's beam.
-
 use crate::coverage::Coverage;
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
@@ -16,7 +14,6 @@ use palpate::prelude::{
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "beam-ends",
     title: "Contacts near the ends of a beam",
@@ -26,17 +23,15 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// Distances from the left end, in mm.
+/// From the left end.
 const PLACES_MM: [f64; 11] = [0.5, 1.0, 2.0, 4.0, 7.0, 10.0, 15.0, 22.0, 25.0, 40.0, 100.0];
 
-/// Locators that are compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Method {
-    /// Influence functions from mechanics, corrected by a recording of ten presses at each of ten places.
+    /// Mechanics, corrected by a recording of ten presses at each of ten places.
     Corrected,
-    /// Influence functions from the recording alone, of so many places pressed so often.
+    /// The recording alone: places, and presses at each.
     Learnt(usize, usize),
-    /// The closed form.
     ClosedForm,
 }
 
@@ -65,7 +60,6 @@ const CASES: [Case; 6] = [
     Case { method: Method::ClosedForm, is_known: true, forces_n: &[3.0] },
 ];
 
-/// Calibrations, and readings at each place.
 #[derive(Clone, Copy, Debug)]
 struct Repetitions {
     calibrations: u64,
@@ -134,7 +128,7 @@ impl Case {
     }
 }
 
-/// Readings of a contact, located by locators in turn.
+/// Locates readings of a contact by locators in turn.
 fn cover(
     setup: &Setup,
     locators: &[BoxedLocator],

@@ -1,4 +1,4 @@
-//! Benches in a world that are calibrated, and located on afterwards.
+//! Simulated benches, calibrated and then used.
 
 use crate::tally::Tally;
 use anyhow::{Context, Result, ensure};
@@ -14,49 +14,43 @@ use palpate::prelude::{
     Watch,
 };
 
-/// World in which a bench is simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum World {
     /// Noise and resolution alone.
     Clean,
-    /// The imperfections of the rig, and the gain, offset and place errors of its sensors.
+    /// With the imperfections of the rig, and errors of gain, offset and place of its sensors.
     Imperfect,
 }
 
-/// Knowledge that the locator has of the surface.
+/// Locator's knowledge of the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Knowledge {
-    /// The model of the rig.
     Model,
-    /// Readings of raw channels, pressed with several forces.
+    /// Raw channels, pressed with several forces.
     Measured,
 }
 
-/// Zero of the readings in use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Zero {
-    /// The untouched rows before the first contact.
+    /// Untouched rows before the first contact.
     Once,
-    /// The untouched rows before each contact.
+    /// Untouched rows before each contact.
     Each,
 }
 
-/// Forces in turn, as multiples of the force of the rig's presses.
+/// Multiples of the rig's force, in turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forces {
-    /// Of the presses on raw channels; those of a surface with a model all have the force of the rig.
+    /// Of presses on raw channels; with a model all presses have the rig's force.
     pub pressed: &'static [f64],
-    /// Of the contacts in use.
     pub touched: &'static [f64],
 }
 
 impl Forces {
-    /// Once, half and twice the force, in calibration and in use.
     pub const UNKNOWN: Self =
         Self { pressed: &Calibration::UNKNOWN_FORCES, touched: &Calibration::UNKNOWN_FORCES };
 }
 
-/// A bench in a world, with what a locator is given of it.
 pub struct Bench<'a> {
     pub rig: &'a Rig,
     pub world: World,
@@ -64,23 +58,20 @@ pub struct Bench<'a> {
     pub forces: Forces,
 }
 
-/// Untouched rows of each rest in use: as many as a person tares with.
+/// As many as a person tares with.
 const UNTOUCHED_ROWS: u32 = 10;
-/// Multiple of the smallest detectable force that has to be found.
+/// Multiple of the smallest detectable force.
 const LIGHT: f64 = 5.0;
-/// Of the contacts in use each so many-th is repeated lightly.
+/// Contacts per light repetition.
 const LIGHT_EACH: usize = 4;
 
-/// Recordings of one bench.
 pub struct Recordings {
-    /// The setup that the locator is given.
+    /// Setup of the locator.
     pub known: Setup,
     pub calibration: Recording,
-    /// Contacts in use, with untouched rows between them.
+    /// Contacts in use, with untouched rows between.
     pub touches: Recording,
-    /// Places of the contacts in use.
     places: Vec<Position>,
-    /// The bench in use.
     used: Setup,
     seed: u64,
 }
@@ -122,7 +113,6 @@ impl Bench<'_> {
         })
     }
 
-    /// The setup of the rig in the world.
     fn setup(&self) -> Result<Setup> {
         let mut setup = self.rig.setup.clone();
         let of_rig = setup.imperfections().copied().context("the rig has no [imperfections]")?;
@@ -140,7 +130,6 @@ impl Bench<'_> {
         Ok(setup.with_imperfections(imperfections)?)
     }
 
-    /// The setup that the locator is given.
     fn known(&self, setup: &Setup) -> Result<Setup> {
         if self.knowledge == Knowledge::Model {
             return Ok(setup.clone());
@@ -155,7 +144,6 @@ impl Bench<'_> {
     }
 }
 
-/// Imperfections of a setup with the untouched rows of use.
 fn with_many_untouched_rows(setup: &Setup) -> Result<Imperfections> {
     let mut imperfections = setup.imperfections().copied().context("the setup has no imperfections")?;
     imperfections.schedule.untouched_rows = UNTOUCHED_ROWS;
@@ -163,7 +151,7 @@ fn with_many_untouched_rows(setup: &Setup) -> Result<Imperfections> {
 }
 
 impl Recordings {
-    /// Fits an estimator, and locates by each zero; adds to as many tallies.
+    /// Fits an estimator, and adds its estimates by each zero to a tally.
     pub fn judge(
         &self,
         estimator: &Estimator,
@@ -192,8 +180,7 @@ impl Recordings {
 }
 
 impl Recordings {
-    /// Distances of the centre of force from the contacts, in metres, where the sensors are load cells of known places: Σ r·x/Σ r over the cells' readings r,
-    /// each less the rest before it.
+    /// Errors of the centre of force Σ r·x/Σ r over load cells of known places, with readings r less the rest before them.
     pub fn centre_of_force_errors_m(&self) -> Vec<f64> {
         let sensors = self.used.layout().sensors();
         if sensors.iter().any(|sensor| sensor.kind != SensorKind::Reaction) {
@@ -223,8 +210,7 @@ impl Recordings {
         errors_m
     }
 
-    /// Contacts of five times the force that the locator finds with a probability of 95 %, by the noise of the bench and the scatter of its
-    /// untouched rows, where there is one.
+    /// Contacts of [`LIGHT`] times the force that is detected with 95 % probability, given the noise and the scatter of untouched rows.
     fn light_touches(&self, locator: &Locator) -> Result<Recording> {
         let limit = self.used.cramer_rao_bound()?;
         let touch = locator.add_scatter(Influence::default().lightest_touch(&limit));
@@ -240,7 +226,7 @@ impl Recordings {
     }
 }
 
-/// The rows after the first rest, tared. Untouched rows are tared by the rest before them.
+/// Rows after the first rest, tared; untouched rows by the rest before them.
 fn tared(locator: &Locator, recording: &Recording, zero: Zero) -> Result<Recording> {
     let mut runs = recording.rows.chunk_by(|a, b| a.touches() == b.touches());
     let rest = runs.next().filter(|rows| rows.iter().all(|row| !row.touches()));
@@ -264,13 +250,12 @@ fn tared(locator: &Locator, recording: &Recording, zero: Zero) -> Result<Recordi
     Ok(Recording { rows, ..recording.clone() })
 }
 
-/// Contacts at places with multiples of a force in turn.
 fn in_turn(places: &[Position], force_n: f64, shares: &[f64]) -> Vec<Contact> {
     let shares = places.iter().zip(shares.iter().cycle());
     shares.map(|(position, share)| Contact { position: *position, force_n: share * force_n }).collect()
 }
 
-/// About so many positions in the middles of equal cells, as square as they can be on a plane.
+/// Middles of about `count` equal cells, as square as possible on a plane.
 fn all_over(extent: Extent, count: usize) -> Vec<Position> {
     let Some(width_m) = extent.width_m() else { return cells(extent, count, 1) };
     let side = |ratio: f64| (count as f64 * ratio).sqrt().round().max(1.0) as usize;

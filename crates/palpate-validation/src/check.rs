@@ -4,11 +4,11 @@ use crate::experiment::Size;
 use crate::report::Report;
 use crate::table::{Figure, Goal, Row, Table};
 
-/// Standard errors of the difference by which a figure has to be worse. Of a thousand figures that are drawn again, 0.03 are this far off by chance.
+/// Threshold in standard errors of the difference; chance exceeds it for 0.03 of 1,000 figures.
 const STANDARD_ERRORS: f64 = 4.0;
 
-/// True where a measured figure is worse than the stored one by more than [`STANDARD_ERRORS`] standard errors of their difference √(σ₁² + σ₂²).
-/// Figures without a standard error are not compared. For a goal of [`Goal::Near`] the loss is the growth of the distance from it.
+/// True if worse by more than [`STANDARD_ERRORS`] standard errors √(σ₁² + σ₂²) of the difference. Figures without a standard error are not compared.
+/// For [`Goal::Near`] the loss is the growth of the distance.
 fn is_worse(stored: Figure, measured: Figure, goal: Goal) -> bool {
     let (Some(stored_error), Some(measured_error)) = (stored.standard_error, measured.standard_error) else {
         return false;
@@ -23,8 +23,8 @@ fn is_worse(stored: Figure, measured: Figure, goal: Goal) -> bool {
     loss > STANDARD_ERRORS * stored_error.hypot(measured_error) + rounding
 }
 
-/// Figures that are worse than stored, a line each: experiment, row, column, stored and measured value. A figure that is stored and not measured is a
-/// line too, and so is a table or row, except that quick experiments have some of the rows alone.
+/// Worse figures, a line each: experiment, row, column, stored and measured value. Missing figures, rows and tables are lines too, except for rows
+/// that a quick experiment omits.
 pub fn worse_figures(stored: &Report, measured: &Report) -> Vec<String> {
     let mut lines = Vec::new();
     let of_experiment = |line: String| format!("{}: {line}", measured.experiment);

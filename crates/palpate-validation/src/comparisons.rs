@@ -1,5 +1,3 @@
-//! Built-in studies that compare palpate's locators with published methods.
-
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::statistics::{Sample, Share};
@@ -9,7 +7,6 @@ use palpate::prelude::{Rig, Watch};
 use palpate_studies::dead_areas::{self, DeadAreaResults, DeadAreas};
 use palpate_studies::elliott::{self, Chain, ChainRow, Elliott, ElliottResults};
 
-/// Elliott's chain.
 pub const ELLIOTT: Experiment = Experiment {
     name: "elliott",
     title: "Elliott's chain on a plate",
@@ -19,7 +16,6 @@ pub const ELLIOTT: Experiment = Experiment {
     run: elliott,
 };
 
-/// Dead areas between sensors.
 pub const DEAD_AREAS: Experiment = Experiment {
     name: "dead-areas",
     title: "Dead areas between sensors",
@@ -29,7 +25,7 @@ pub const DEAD_AREAS: Experiment = Experiment {
     run: dead_areas,
 };
 
-/// Contacts of a calibration of [`DEAD_AREAS`].
+/// Per calibration of [`DEAD_AREAS`].
 const CONTACTS: u32 = 399;
 
 fn elliott(size: Size, progress: Progress) -> Result<Vec<Table>> {
@@ -120,7 +116,6 @@ impl DeadAreaCase {
     }
 }
 
-/// Rows by sensing and estimator, with rising numbers of sensors.
 fn dead_area_rows(cases: &[DeadAreaCase], results: &[DeadAreaResults], counts: &[usize]) -> Vec<Row> {
     let mut kinds: Vec<(&str, &str)> = Vec::new();
     for row in results.iter().flat_map(|results| &results.rows) {

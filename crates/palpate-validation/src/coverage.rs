@@ -1,5 +1,3 @@
-//! Coverage of 95 % intervals of contacts at one place.
-
 use crate::statistics::{Sample, Share};
 use crate::table::{Column, Figure, Goal};
 use palpate::estimators::estimate_record::ContactRecord;
@@ -20,7 +18,6 @@ pub struct Coverage {
 }
 
 impl Coverage {
-    /// Adds an estimate by the locator of a calibration.
     pub fn add(&mut self, calibration: u64, estimate: &Estimate, truth: Contact, extent: Extent) {
         let is_detected = estimate.status != Status::NoContact;
         self.detected.add(calibration, is_detected);
@@ -48,7 +45,6 @@ impl Coverage {
         self.greatest_n = self.greatest_n.max(found.force_n.unwrap_or(0.0));
     }
 
-    /// Columns of [`Self::line_figures`].
     pub fn line_columns() -> Vec<Column> {
         vec![
             Column::percent("detected", Goal::Larger),
@@ -61,7 +57,6 @@ impl Coverage {
         ]
     }
 
-    /// Figures of contacts on a line.
     pub fn line_figures(&self) -> Vec<Option<Figure>> {
         vec![
             self.detected.percent(),
@@ -74,7 +69,7 @@ impl Coverage {
         ]
     }
 
-    /// Columns of [`Self::plane_figures`], for contacts by their distance from the edge x = 0.
+    /// Columns for contacts by distance from the edge x = 0.
     pub fn plane_columns() -> Vec<Column> {
         vec![
             Column::percent("detected", Goal::Larger),
@@ -89,7 +84,6 @@ impl Coverage {
         ]
     }
 
-    /// Figures of contacts on a plane.
     pub fn plane_figures(&self) -> Vec<Option<Figure>> {
         vec![
             self.detected.percent(),
@@ -104,7 +98,7 @@ impl Coverage {
         ]
     }
 
-    /// The greatest force of an estimate, which has no standard error.
+    /// Greatest estimated force, without a standard error.
     fn greatest(&self) -> Option<Figure> {
         let is_detected = !self.error_mm.is_empty();
         is_detected.then_some(Figure::exact(self.greatest_n))

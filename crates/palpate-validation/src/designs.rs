@@ -1,5 +1,3 @@
-//! Sensor layouts and training positions that `palpate design` finds for example rigs.
-
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::table::{Column, Figure, Goal, Row, Table};
@@ -9,7 +7,6 @@ use palpate::design::positions::{Placement, PositionDesign, PositionProblem, Ver
 use palpate::design::sensors::{AssessedLayout, SensorProblem, to_verify};
 use palpate::prelude::{Rig, Watch};
 
-/// Layouts of sensors.
 pub const SENSOR_LAYOUTS: Experiment = Experiment {
     name: "sensor-layouts",
     title: "Sensor layouts",
@@ -20,7 +17,6 @@ pub const SENSOR_LAYOUTS: Experiment = Experiment {
     run: sensor_layouts,
 };
 
-/// Training positions of the founding paper's network.
 pub const NETWORK_POSITIONS: Experiment = Experiment {
     name: "network-positions",
     title: "Presses for the founding paper's network",
@@ -31,7 +27,7 @@ pub const NETWORK_POSITIONS: Experiment = Experiment {
 };
 
 const SEED: u64 = 0;
-/// Calibrations that evaluate an arrangement, as in `palpate design positions`.
+/// As in `palpate design positions`.
 const CALIBRATIONS: usize = 8;
 
 #[derive(Clone, Copy)]
@@ -104,9 +100,9 @@ fn error(verification: &Verification) -> Figure {
 #[derive(Clone, Copy)]
 struct PositionCase {
     count: usize,
-    /// Arrangements that the search evaluates.
+    /// Arrangements of the search.
     trials: usize,
-    /// Calibrations that evaluate each.
+    /// Calibrations of each arrangement.
     calibrations: usize,
 }
 

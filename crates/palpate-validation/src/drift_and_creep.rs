@@ -1,5 +1,3 @@
-//! Tracks of a contact that rests on a surface that drifts and creeps.
-
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::statistics::Sample;
@@ -12,7 +10,6 @@ use palpate::prelude::{
     Contact, Fit, FitTask, Imperfections, Position, Rig, Setup, Status, Tracker, TrackerConfig, Watch, mm,
 };
 
-/// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "drift-and-creep",
     title: "Drift and creep under a resting contact",
@@ -24,20 +21,18 @@ pub const EXPERIMENT: Experiment = Experiment {
 };
 
 const RIG: &str = include_str!("../../../examples/noisy-beam.toml");
-/// Distinguishes the seeds of contacts from those of calibrations.
+/// Offset of contact seeds from calibration seeds.
 const CONTACT_SEEDS: u64 = 1000;
 const RATE_HZ: f64 = 100.0;
-/// Untouched readings of the tare.
 const TARE: usize = 100;
-/// Part of a contact that is not counted.
+/// Uncounted start of a contact.
 const ONSET_S: f64 = 1.0;
-/// Time from the onset of a press to its reading in a guided calibration: the middle of its readings at rest.
+/// Time from the onset of a press to its reading: the middle of those at rest.
 const PRESSED_S: f64 = 0.2;
-/// Places of the contacts, one after each calibration in turn.
+/// One after each calibration in turn.
 const PLACES_MM: [f64; 6] = [63.0, 117.0, 160.0, 211.0, 289.0, 331.0];
 const CREEP: Relaxation = Relaxation { share: 0.05, time_s: 20.0 };
 
-/// Faults of the surface in use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
     None,
@@ -49,7 +44,7 @@ enum Fault {
 
 const FAULTS: [Fault; 5] = [Fault::None, Fault::Line, Fault::Walk, Fault::Creep, Fault::LineAndCreep];
 
-/// Part of the tracker's state beside the contacts.
+/// Tracker state beside the contacts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
     Neither,
@@ -57,7 +52,7 @@ enum State {
     Both,
 }
 
-/// Seconds of a recording.
+/// In seconds.
 #[derive(Clone, Copy, Debug)]
 struct Durations {
     before_s: f64,
@@ -141,10 +136,9 @@ impl State {
     }
 }
 
-/// Tared readings of one contact.
 struct Readings {
     contact: Contact,
-    /// Numbers of the readings of the contact.
+    /// Indices of the contact's readings.
     pressed: std::ops::Range<usize>,
     tared: Vec<Vec<f64>>,
 }
@@ -178,7 +172,7 @@ impl Case {
         Ok(states.iter().zip(&tallies).map(row).collect())
     }
 
-    /// A locator calibrated with fresh presses on the creeping surface.
+    /// Calibrates with fresh presses on the creeping surface.
     fn calibrated(&self, rig: &Rig, seed: u64) -> Result<Locator> {
         let mut recording = rig.simulate(seed)?;
         if self.fault.creeps() {
@@ -219,7 +213,6 @@ fn force_n(rig: &Rig) -> Result<f64> {
     rig.setup.force_n().context("examples/noisy-beam.toml has a known force")
 }
 
-/// Figures of one contact.
 #[derive(Clone, Copy, Debug)]
 struct Outcome {
     error_mm: Option<f64>,
@@ -258,7 +251,7 @@ fn track(locator: &Locator, config: TrackerConfig, readings: &Readings) -> Resul
     })
 }
 
-/// Outcomes of contacts, each one value: readings of one contact share drift and creep.
+/// Each contact is one value: its readings share drift and creep.
 #[derive(Clone, Debug, Default)]
 struct Tally {
     error_mm: Sample,

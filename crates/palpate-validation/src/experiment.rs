@@ -1,4 +1,4 @@
-//! An experiment and its size.
+//! Experiment and size.
 
 use crate::table::Table;
 use anyhow::Result;
@@ -15,7 +15,7 @@ pub enum Size {
 }
 
 impl Size {
-    /// The number of repetitions of this size.
+    /// Repetitions of this size.
     pub fn pick<T>(self, full: T, quick: T) -> T {
         match self {
             Self::Full => full,
@@ -24,19 +24,19 @@ impl Size {
     }
 }
 
-/// Receives the name of a finished case, the number of finished cases and of all.
+/// Receives the name of a finished case, the numbers of finished and of all cases.
 pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
 
 /// Experiment with fixed seeds.
 #[derive(Clone, Copy)]
 pub struct Experiment {
-    /// Name, which is that of its files too.
+    /// Name, also of the files.
     pub name: &'static str,
     /// Title.
     pub title: &'static str,
     /// Method, in two sentences.
     pub method: &'static str,
-    /// Smallest seed; the others follow it.
+    /// Smallest seed; others follow it.
     pub seed: u64,
     /// Runs the experiment.
     pub run: fn(Size, Progress) -> Result<Vec<Table>>,

@@ -1,5 +1,3 @@
-//! Rates of `no_contact` and `outside_model` where the noise is known.
-
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::statistics::Share;
@@ -21,7 +19,6 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 
-/// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "false-alarms",
     title: "False alarms",
@@ -31,19 +28,19 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// Presses at each place.
+/// Presses per place.
 const REPEATS: usize = 1000;
-/// Positions along each side in the Euler characteristic.
+/// Positions per side in the Euler characteristic.
 const SIDE: usize = 60;
 
 struct Bench {
     name: &'static str,
-    /// Setup with an unknown force.
+    /// With an unknown force.
     setup: Setup,
     force_n: f64,
     training: Training,
     estimator: Estimator,
-    /// Readings of noise, and as many of contacts.
+    /// Of noise, and as many of contacts.
     readings: usize,
 }
 
@@ -99,7 +96,7 @@ fn benches() -> Result<[Bench; 4]> {
     ])
 }
 
-/// Alarms of noise, and contacts that are `outside_model`.
+/// Alarms of noise, and `outside_model` contacts.
 #[derive(Clone, Debug, Default)]
 struct Alarms {
     beyond_noise: Share,
@@ -135,7 +132,6 @@ impl Case<'_> {
         Ok(Row::new(&[name, force], figures))
     }
 
-    /// Adds the readings after one calibration.
     fn add(
         &self,
         setup: &Setup,

@@ -1,5 +1,3 @@
-//! Errors of the influence method on the founding paper's beam, by the source of its influence functions.
-
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::statistics::{Ratio, Sample, Share};
@@ -12,7 +10,6 @@ use palpate::mechanics::limit::Force;
 use palpate::mechanics::sensing::ChannelModel;
 use palpate::prelude::{Contact, FitTask, Influence, Locate, Position, Setup, Training, mm, newtons, um};
 
-/// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "influence-sources",
     title: "Influence functions from the recording and from mechanics",
@@ -24,7 +21,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 };
 
 const FORCE_N: f64 = 3.0;
-/// Largest standard deviation of the bound at a touch, in metres.
+/// Of the bound's standard deviation at a touch.
 const LARGEST_BOUND_M: f64 = 2e-3;
 /// Distance of places, and touches of each.
 const EVERY_MM: usize = 3;
@@ -32,13 +29,12 @@ const TOUCHES: usize = 2;
 const SOURCES: [(InfluenceSource, &str); 2] =
     [(InfluenceSource::Recording, "recording"), (InfluenceSource::Corrected, "mechanics, corrected")];
 
-/// Sensors of the bench.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Sensors {
     Exact,
-    /// One sensor is disabled after the calibration.
+    /// Disabled after the calibration.
     Disabled(usize),
-    /// Gains, offsets and places have errors.
+    /// With errors of gain, offset and place.
     Erroneous,
 }
 
@@ -74,7 +70,7 @@ fn run(size: Size, progress: Progress) -> Result<Vec<Table>> {
     Ok(vec![noisy, clean])
 }
 
-/// The founding paper's bench with a known force.
+/// Founding paper's bench with a known force.
 fn paper(channel: ChannelModel) -> Result<Setup> {
     Ok(paper_beam_with(channel)?.known_force(newtons(FORCE_N))?)
 }
@@ -114,7 +110,6 @@ impl Case {
         Ok(Row::new(&labels, vec![ratio.figure(), covered.percent()]))
     }
 
-    /// Adds the touches after one calibration.
     fn add(self, seed: u64, ratio: &mut Ratio, covered: &mut Share) -> Result<()> {
         let assumed = paper(Sensors::Exact.channel())?;
         let assumed = assumed.with_force((self.force == Force::Known).then_some(FORCE_N))?;

@@ -1,6 +1,6 @@
-//! Experiments over the public API of palpate, each a table of figures: `cargo xtask validate NAME`.
+//! Experiments over the public API of palpate: `cargo xtask validate NAME`.
 //!
-//! [`registry::EXPERIMENTS`] lists them. [`report::Report`] runs one, and writes its tables as Markdown and JSON; [`check`] compares them with stored ones.
+//! [`registry::EXPERIMENTS`] lists them. [`report::Report`] runs one and writes its tables; [`check`] compares them with stored ones.
 #![forbid(unsafe_code)]
 
 mod beam_ends;

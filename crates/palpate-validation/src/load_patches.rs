@@ -1,5 +1,3 @@
-//! Load profiles by where loads lie: two pads at their limits, patches and totals by their distance from a support, and a load over the whole beam.
-
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::statistics::{Sample, Share};
@@ -12,7 +10,6 @@ use palpate::prelude::{microstrain, mm, um};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "load-patches",
     title: "Patches and totals of load profiles",
@@ -55,16 +52,15 @@ fn centre_m(loads: &[UniformLoad]) -> f64 {
     loads.iter().map(|load| load.force_n() * load.centre().x_m).sum::<f64>() / total_n(loads)
 }
 
-/// A row of one of the tables.
 #[derive(Clone, Copy, Debug)]
 enum Case {
-    /// Two pads of 2 N, 120 mm apart; with strain sensors or without.
+    /// 2 N each, 120 mm apart.
     TwoPads { has_strain: bool },
-    /// One load, or two at least 100 mm apart, by the range of the outermost centre's distance from a support.
+    /// One load, or two at least 100 mm apart; range of the outermost centre's distance from a support.
     Patches { is_two: bool, distance_m: (f64, f64) },
-    /// 4 N over the whole beam.
+    /// With 4 N.
     WholeBeam,
-    /// One or two pads by the range of the outermost centre's distance from a support.
+    /// One or two pads; distance as for `Patches`.
     Totals { distance_m: (f64, f64) },
 }
 
@@ -100,7 +96,6 @@ impl Case {
         }
     }
 
-    /// Number of its table.
     const fn table(self) -> usize {
         match self {
             Self::TwoPads { .. } => 0,
@@ -221,7 +216,7 @@ fn rng() -> Xoshiro256PlusPlus {
     Xoshiro256PlusPlus::seed_from_u64(EXPERIMENT.seed)
 }
 
-/// A load of 1 to 60 mm and 0.5 to 20 N around a centre, as wide as the beam allows.
+/// 1 to 60 mm and 0.5 to 20 N, as wide as the beam allows.
 fn random_load(centre_m: f64, rng: &mut Xoshiro256PlusPlus) -> UniformLoad {
     let widest_m = f64::min(0.06, 2.0 * centre_m.min(BEAM_M - centre_m));
     let half_m = 0.5 * rng.random_range(0.001..widest_m.max(0.0011));
@@ -229,7 +224,7 @@ fn random_load(centre_m: f64, rng: &mut Xoshiro256PlusPlus) -> UniformLoad {
     UniformLoad::along((centre_m - half_m).max(0.0), (centre_m + half_m).min(BEAM_M), force_n)
 }
 
-/// Intervals of one load of each reading.
+/// Of one load per reading.
 #[derive(Default)]
 struct PatchTally {
     detected: Share,
@@ -241,7 +236,7 @@ struct PatchTally {
 }
 
 impl PatchTally {
-    /// Adds a profile; the figures of patches are those of this load.
+    /// Adds a profile; patch figures are those of `load`.
     fn add(&mut self, reading: u64, profile: &LoadProfile, loads: &[UniformLoad], load: usize) {
         self.total.add(reading, contains(profile.bounds.total_95_n, total_n(loads)));
         self.detected.add(reading, profile.patches.len() == loads.len());

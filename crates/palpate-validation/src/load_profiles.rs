@@ -1,5 +1,3 @@
-//! Load profiles of random loads on the founding paper's beam: coverage and width of the intervals of total force, centre of pressure and patches.
-
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::statistics::{Sample, Share};
@@ -11,7 +9,6 @@ use palpate::prelude::{gpa, microstrain, mm, newtons, um};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "load-profiles",
     title: "Load profiles of random loads",
@@ -23,23 +20,21 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 const SEED: u64 = EXPERIMENT.seed;
 
-/// Length of the beam, in mm.
 const LENGTH_MM: f64 = 400.0;
-/// Range of a random load's width, in mm.
+/// Of random loads.
 const WIDTHS_MM: (f64, f64) = (10.0, 100.0);
-/// Range of a random load's force, in newtons.
+/// Of random loads.
 const FORCES_N: (f64, f64) = (1.0, 20.0);
-/// Distance of a load's nearer end from a support, in mm, below which the load is beside the support.
+/// Distance of the nearer end from a support below which a load is beside it.
 const BESIDE_MM: f64 = 10.0;
 
-/// Sensors of the beam.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Sensors {
-    /// Eight deflection sensors with 5 µm noise.
+    /// Eight, with 5 µm noise.
     Deflection5,
-    /// Eight deflection sensors with 2 µm noise.
+    /// Eight, with 2 µm noise.
     Deflection2,
-    /// Eight deflection sensors with 2 µm noise, and eight strain sensors with 0.5 µε.
+    /// Eight each, with 2 µm and 0.5 µε noise.
     DeflectionAndStrain,
 }
 
@@ -49,14 +44,13 @@ const SENSORS: [(Sensors, &str); 3] = [
     (Sensors::DeflectionAndStrain, "deflection, 2 µm, and strain, 0.5 µε"),
 ];
 
-/// Loads on the beam.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Loads {
-    /// One to three disjoint loads at random.
+    /// One to three, disjoint.
     Random,
-    /// The random loads with one load beside a support.
+    /// Random, with one beside a support.
     BesideSupport,
-    /// The random loads without a load beside a support.
+    /// Random, with none beside a support.
     AwayFromSupports,
     /// 20 N on 370–390 mm and 2 N on 100–160 mm.
     HeavyAndLight,
@@ -131,7 +125,6 @@ fn random_load(rng: &mut Xoshiro256PlusPlus) -> UniformLoad {
     UniformLoad::along(mm(from_mm), mm(from_mm + width_mm), newtons(force_n))
 }
 
-/// Intervals of one quantity.
 #[derive(Clone, Debug, Default)]
 struct Intervals {
     covered: Share,
@@ -146,13 +139,12 @@ impl Intervals {
         self.widths.add(reading, high - low);
     }
 
-    /// Coverage, share of intervals with an upper end, and median width, which is missing where it is infinite.
+    /// Coverage, share with an upper end, and median width unless infinite.
     fn figures(&self) -> [Option<Figure>; 3] {
         [self.covered.percent(), self.bounded.percent(), self.widths.median()]
     }
 }
 
-/// Figures of one row.
 #[derive(Default)]
 struct Tally {
     located: Share,
@@ -162,7 +154,7 @@ struct Tally {
     centre_of_pressure: Intervals,
     patch_force: Intervals,
     patch_centre: Intervals,
-    /// Loads with a centre in the interval of a patch's centre, in readings with fewer patches than loads.
+    /// Loads centred in a patch's interval, in readings with fewer patches than loads.
     merged_centres: Share,
 }
 

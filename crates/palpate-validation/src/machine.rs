@@ -1,19 +1,14 @@
-//! Class of the machine that an experiment ran on.
-
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Cores and processor of a machine.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Machine {
-    /// Cores.
     pub cores: usize,
-    /// Model of the processor; its architecture where the system does not name the model.
+    /// Model, or else architecture.
     pub processor: String,
 }
 
 impl Machine {
-    /// This machine.
     pub fn this() -> Self {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let information = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
@@ -28,7 +23,7 @@ impl fmt::Display for Machine {
     }
 }
 
-/// The model in the text of /proc/cpuinfo.
+/// Model in the text of /proc/cpuinfo.
 fn model(information: &str) -> Option<&str> {
     let line = information.lines().find(|line| line.starts_with("model name"))?;
     Some(line.split_once(':')?.1.trim())

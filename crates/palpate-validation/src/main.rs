@@ -42,7 +42,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs the experiments; false where a check finds a worse figure.
+/// False if a check finds a worse figure.
 fn run(arguments: &Arguments) -> Result<bool> {
     let experiments = by_names(&arguments.names)?;
     if arguments.list {
@@ -79,7 +79,6 @@ fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// Folder of the files of this size.
 fn folder(size: Size) -> PathBuf {
     workspace().join(size.pick("docs/validation", "target/validation"))
 }
@@ -88,7 +87,7 @@ fn print(text: &str) -> Result<()> {
     std::io::stdout().write_all(text.as_bytes()).context("cannot print the table")
 }
 
-/// Runs an experiment, with its progress on a terminal.
+/// Shows progress on a terminal.
 fn with_progress<R>(
     experiment: &str,
     run: impl FnOnce(&(dyn Fn(&str, usize, usize) + Sync)) -> Result<R>,

@@ -1,5 +1,3 @@
-//! Coverage of contacts by their distance from an end of a beam or an edge of a plate of raw channels.
-
 use crate::coverage::Coverage;
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
@@ -16,7 +14,6 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::sync::Arc;
 
-/// The experiment on beams.
 pub const BEAMS: Experiment = Experiment {
     name: "measured-beam-ends",
     title: "Contacts near the ends of a beam of raw channels",
@@ -26,7 +23,6 @@ pub const BEAMS: Experiment = Experiment {
     run: run_beams,
 };
 
-/// The experiment on plates.
 pub const PLATES: Experiment = Experiment {
     name: "measured-plate-edges",
     title: "Contacts near the edges of a plate of raw channels",
@@ -36,32 +32,29 @@ pub const PLATES: Experiment = Experiment {
     run: run_plates,
 };
 
-/// Noise of a channel, which is one count, in metres.
+/// One count of a channel, in metres.
 const NOISE_M: f64 = 5e-6;
 const BEAM_M: f64 = 0.4;
 const PLATE_SIDE_M: f64 = 0.3;
 
-/// Boards, and readings at each place.
 #[derive(Clone, Copy, Debug)]
 struct Repetitions {
     boards: u64,
     readings: u64,
 }
 
-/// Forces of the presses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Pressed {
-    /// 3 N each, with an untouched row after each.
+    /// 3 N each, with an untouched row after.
     Alike,
     /// 0.5 to 5 N.
     Variously,
 }
 
-/// Presses of a beam, and contacts on it.
 struct BeamCase {
     places: usize,
     times: usize,
-    /// First and last place, in mm.
+    /// First and last place.
     span_mm: (f64, f64),
     pressed: Pressed,
     is_known: bool,
@@ -87,7 +80,7 @@ const fn few_places(times: usize) -> BeamCase {
     BeamCase { forces_n: &[3.0], contacts_mm: &BETWEEN_MM, ..case }
 }
 
-/// The quick ones first.
+/// Quick ones first.
 const BEAM_CASES: [BeamCase; 10] = [
     few_places(1),
     few_places(3),
@@ -167,7 +160,7 @@ impl BeamCase {
     }
 }
 
-/// Coverage of contacts, each drawn by the board that it presses, by boards in turn.
+/// Coverage of contacts drawn by boards in turn.
 fn cover(
     boards: &mut [(RawBench, InfluenceLocator)],
     readings: u64,
@@ -185,9 +178,8 @@ fn cover(
     coverage
 }
 
-/// Presses of a plate, and contacts on it.
 struct PlateCase {
-    /// Places each way.
+    /// Each way.
     places: usize,
     known_force_n: Option<f64>,
     force_n: f64,
@@ -200,7 +192,7 @@ const fn near_edge(force_n: f64, known_force_n: Option<f64>) -> PlateCase {
     PlateCase { places: 6, known_force_n, force_n, contacts_mm: &NEAR_EDGE_MM }
 }
 
-/// The quick ones first.
+/// Quick ones first.
 const PLATE_CASES: [PlateCase; 5] = [
     PlateCase { places: 4, known_force_n: None, force_n: 5.0, contacts_mm: &[10.0, 60.0, 100.0, 150.0] },
     near_edge(5.0, Some(5.0)),
@@ -221,7 +213,7 @@ fn run_plates(size: Size, progress: Progress) -> Result<Vec<Table>> {
     Ok(vec![table])
 }
 
-/// The plate, whose solution all boards share, and its nine sensors.
+/// Plate solution that boards share, and nine sensors.
 #[derive(Clone)]
 struct PlateInfluences {
     plate: Arc<Plate>,

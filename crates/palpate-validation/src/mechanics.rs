@@ -1,5 +1,3 @@
-//! Errors on supported beams and on the digit beside the Cramér–Rao bound, and convergence of plates.
-
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::statistics::{Ratio, Sample, Share};
@@ -14,7 +12,6 @@ use palpate::prelude::{
 };
 use std::f64::consts::{FRAC_2_PI, PI};
 
-/// Beams on other supports than two simple ones.
 pub const SUPPORTED_BEAMS: Experiment = Experiment {
     name: "supported-beams",
     title: "Beams on other supports",
@@ -24,7 +21,6 @@ pub const SUPPORTED_BEAMS: Experiment = Experiment {
     run: supported_beams,
 };
 
-/// The flexible digit.
 pub const DIGIT_LIMIT: Experiment = Experiment {
     name: "digit-limit",
     title: "Errors on a digit and the Cramér–Rao bound",
@@ -34,7 +30,6 @@ pub const DIGIT_LIMIT: Experiment = Experiment {
     run: digit_limit,
 };
 
-/// Meshes of a plate.
 pub const PLATE_MESH: Experiment = Experiment {
     name: "plate-mesh",
     title: "Convergence of a plate",
@@ -126,7 +121,7 @@ const DIRECTIONS: [(ForceDirection, &str); 2] =
 const FORCES_N: [f64; 5] = [1.0, 3.0, 5.0, 8.0, 13.0];
 const TOUCHES: usize = 400;
 const SECOND_GAUGE_MM: f64 = 20.0;
-/// Signal of the second gauge in standard deviations of its noise.
+/// Of the second gauge, in standard deviations of its noise.
 const LEAST_SIGNAL: f64 = 5.0;
 const SHAPE_STEPS: usize = 40;
 
@@ -227,7 +222,7 @@ fn plate_mesh(size: Size, progress: Progress) -> Result<Vec<Table>> {
     Ok(vec![table])
 }
 
-/// Relative error of the deflection under a force in the middle.
+/// Relative error of the deflection under a central force.
 fn plate_error(elements: usize) -> Result<f64> {
     let plate =
         Plate::simply_supported((SIDE_M, SIDE_M), mm(0.8), gpa(200.0), 0.3)?.with_elements(elements)?;
@@ -240,7 +235,7 @@ fn plate_error(elements: usize) -> Result<f64> {
     Ok((deflection_m / exact_m - 1.0).abs())
 }
 
-/// Deflection in the middle under a unit force there, times D/a²: 4/π⁴·ΣΣ (m² + n²)⁻² over odd m and n.
+/// Central deflection under a unit force there, times D/a²: 4/π⁴·ΣΣ (m² + n²)⁻² over odd m and n.
 fn navier(terms: usize) -> f64 {
     let odd = || (0..terms).map(|k| (2 * k + 1) as f64);
     let line = |m: f64| odd().map(|n| (m * m + n * n).powi(-2)).sum::<f64>();

@@ -1,5 +1,3 @@
-//! Tracks of contacts that move along a beam and across a plate.
-
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::statistics::{Ratio, Sample};
@@ -10,7 +8,6 @@ use palpate::estimators::simulate::{MovingContacts, simulate_moving};
 use palpate::estimators::track_errors::{SPEED_RATIOS, TrackErrors, track_recording};
 use palpate::prelude::{Fit, Rig, TrackerConfig};
 
-/// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "moving-contacts",
     title: "Tracks of moving contacts",
@@ -22,7 +19,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 const BEAM: &str = include_str!("../../../examples/moving-load.toml");
 const PLATE: &str = include_str!("../../../examples/moving-plate.toml");
-/// Distinguishes the seeds of moving contacts from those of calibrations.
+/// Offset of the seeds of moving contacts from calibration seeds.
 const MOVING: u64 = 1000;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +31,7 @@ enum Surface {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Speed {
     MetresPerSecond(f64),
-    /// Share of the beam's critical speed.
+    /// Share of the critical speed.
     OfCritical(f64),
 }
 
@@ -44,7 +41,6 @@ enum Dynamics {
     Inertia,
 }
 
-/// Locator of a surface, and speeds of the contacts.
 #[derive(Clone, Debug)]
 struct Bench {
     surface: Surface,
@@ -119,7 +115,6 @@ impl Speed {
         }
     }
 
-    /// Contacts with this speed.
     fn contacts(self, moving: MovingContacts) -> Result<MovingContacts> {
         let speed_m_per_s = match self {
             Self::MetresPerSecond(speed) => speed,
@@ -131,7 +126,7 @@ impl Speed {
         Ok(moving.at_speed(speed_m_per_s)?)
     }
 
-    /// Assumptions of the trackers at this speed.
+    /// Assumptions of the trackers.
     const fn dynamics(self, surface: Surface) -> &'static [Dynamics] {
         match (surface, self) {
             (Surface::Beam, Self::MetresPerSecond(_)) => &[Dynamics::Equilibrium, Dynamics::Inertia],
@@ -161,7 +156,7 @@ impl Dynamics {
     }
 }
 
-/// Errors of the filter and of the smoother; `None` for a contact that is not tracked.
+/// Of filter and smoother; `None` for an untracked contact.
 type Errors = Option<(TrackErrors, TrackErrors)>;
 
 impl Bench {
@@ -181,7 +176,7 @@ impl Bench {
         self.speeds.iter().flat_map(at).collect()
     }
 
-    /// Errors of all trials after one calibration.
+    /// Errors of all trials.
     fn errors(&self, seed: u64) -> Result<Vec<Errors>> {
         let rig = match self.surface {
             Surface::Beam => Rig::from_toml(BEAM).context("examples/moving-load.toml")?,
@@ -205,7 +200,7 @@ impl Bench {
     }
 }
 
-/// Mean errors and coverage of recordings, each one value: neighbouring readings of a track share their errors.
+/// Each recording is one value: neighbouring readings share their errors.
 #[derive(Clone, Debug, Default)]
 struct Tally {
     single_mm: Sample,

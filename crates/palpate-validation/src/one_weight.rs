@@ -1,4 +1,4 @@
-//! Surfaces that were calibrated with one weight: the unit and the size of the weight must not matter, nor that contacts are several times as heavy.
+//! Calibrations with one weight, whose unit and size must not matter, nor heavier contacts.
 
 use crate::bench::{Bench, Forces, Knowledge, World, Zero};
 use crate::experiment::{Experiment, Progress, Size};
@@ -10,7 +10,6 @@ use crate::tally::{Figures, Tally};
 use anyhow::{Context, Result};
 use palpate::prelude::{Estimator, Influence, Rig};
 
-/// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "one-weight",
     title: "Surfaces calibrated with one weight",
@@ -20,7 +19,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// A shelf on load cells, and gauges under its board.
+/// Load cells, and gauges under the board.
 const SHELF: (&str, &str) = (
     "shelf",
     r#"[surface]
@@ -55,19 +54,18 @@ touch_width = "30 mm"
 "#,
 );
 
-/// Weights of a calibration, in newtons: 100 N, whole and broken numbers of kilograms, and other round numbers.
+/// 100 N, whole and broken numbers of kilograms, and round numbers.
 const WEIGHTS_N: [f64; 6] = [100.0, 98.1, 196.2, 250.0, 500.0, 1000.0];
-/// Presses and contacts with the same weight.
+/// Same weight in calibration and use.
 const ALIKE: Forces = Forces { pressed: &[1.0], touched: &[1.0] };
-/// Presses with one weight, and steps of a person.
+/// One weight, then steps of a person.
 const WALKING: Forces = Forces { pressed: &[1.0], touched: &[5.0, 6.0, 7.0, 8.0, 9.0] };
 
-/// Repetitions of the experiment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Repetitions {
-    /// Seeds of each row, from 0 on.
+    /// Per row, from 0.
     seeds: u64,
-    /// Contacts in use of each seed, about.
+    /// Per seed, about.
     contacts: usize,
 }
 
@@ -78,7 +76,6 @@ struct Case {
     forces: Forces,
 }
 
-/// The floor, the shelf and the strip.
 fn benches() -> [(&'static str, &'static str); 3] {
     let [strip, _, _, floor] = BENCHES;
     [floor, SHELF, strip]

@@ -1,9 +1,7 @@
-//! Cases of an experiment in threads.
-
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// Results of all cases, in their order; `progress` gets the name of a finished case, the number of finished cases and of all.
+/// Results in the order of the cases.
 pub fn in_parallel<C: Sync, R: Send>(
     cases: &[C],
     work: impl Fn(&C) -> R + Sync,

@@ -1,5 +1,3 @@
-//! Coverage of contacts of unknown force by their distance from the edge of the plate of `examples/plate.toml`.
-
 use crate::coverage::Coverage;
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
@@ -12,7 +10,6 @@ use palpate::prelude::{Contact, FitTask, Influence, Locate, Position, Rig, Setup
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "plate-edges",
     title: "Contacts near the edges of a plate",
@@ -23,17 +20,17 @@ pub const EXPERIMENT: Experiment = Experiment {
 };
 
 const RIG: &str = include_str!("../../../examples/plate.toml");
-/// Force of the presses and of contacts, in newtons, and side of the plate in metres.
+/// Force of presses and contacts, and side of the plate.
 const PRESSES_N: f64 = 5.0;
 const CONTACTS_N: [f64; 3] = [2.0, 5.0, 20.0];
 const SIDE_M: f64 = 0.3;
 
-/// A place of contacts, in millimetres.
+/// In millimetres.
 #[derive(Clone, Copy, Debug)]
 enum Place {
-    /// Distance from the left edge.
+    /// From the left edge.
     Edge(f64),
-    /// Distance from the left and from the lower edge.
+    /// From the left and lower edges.
     Corner(f64),
 }
 

@@ -1,5 +1,3 @@
-//! Errors on the plate of `examples/plate.toml` beside the Cramér–Rao bound.
-
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::statistics::{Ratio, Share};
@@ -14,7 +12,6 @@ use palpate::prelude::{Contact, Extent, FitTask, Influence, Locate, Position, Ri
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "plate-limit",
     title: "Errors on a plate and the Cramér–Rao bound",
@@ -31,7 +28,7 @@ const SOURCES: [(InfluenceSource, &str); 3] = [
     (InfluenceSource::Mechanics, "mechanics"),
     (InfluenceSource::Recording, "recording"),
 ];
-/// Ranges of the bound's standard deviation, in mm.
+/// Of the bound's standard deviation, in mm.
 const RANGES: [(f64, f64, &str); 6] = [
     (0.0, 3.0, "below 3 mm"),
     (3.0, 10.0, "3–10 mm"),
@@ -47,7 +44,6 @@ struct Case {
     force: Force,
 }
 
-/// Calibrations, and cells a side.
 #[derive(Clone, Copy)]
 struct Repetitions {
     calibrations: u64,
@@ -73,7 +69,7 @@ fn run(size: Size, progress: Progress) -> Result<Vec<Table>> {
     Ok(vec![table])
 }
 
-/// The middles of `side` × `side` cells of the rectangle about the same centre with sides √0.9 times as long.
+/// Middles of `side` × `side` cells of a centred rectangle with sides √0.9 times as long.
 fn inner_positions(extent: Extent, side: usize) -> Result<Vec<Position>> {
     let share = 0.9f64.sqrt();
     let width_m = extent.width_m().context("the plate has a width")?;

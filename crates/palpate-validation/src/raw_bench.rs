@@ -1,4 +1,4 @@
-//! Raw channels with gains and offsets under surfaces of known physics, which are pressed at a few places: readings in counts, with noise of one count.
+//! Raw gauges under surfaces of known physics; readings in counts, with noise of one count.
 
 use anyhow::Result;
 use palpate::estimators::influence::{InfluenceLocator, Structure};
@@ -12,22 +12,19 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Length of the strip, in metres.
 pub const STRIP_M: f64 = 0.3;
-/// Length and width of the plate, in metres.
 pub const PLATE_M: [f64; 2] = [0.2, 0.15];
-/// Channels of the strip and of the plate.
+/// Channels of strip and plate.
 pub const GAUGES: usize = 6;
-/// Smallest distance of contacts from the ends of strip and plate, in metres.
+/// Smallest distance of contacts from the ends.
 pub const MARGIN_M: f64 = 0.02;
-/// Largest influence of a gauge of gain 1, in counts per newton.
+/// Largest influence at gain 1, in counts per newton.
 const FULL_SCALE: f64 = 60.0;
 const FORCES_N: std::ops::Range<f64> = 0.5..5.0;
 
-/// Counts per newton of each gauge as a function of the position.
+/// Counts per newton of each gauge by position.
 pub type Influences = Box<dyn Fn(Position) -> Vec<f64> + Send + Sync>;
 
-/// Raw gauges under a surface, and how it is pressed.
 pub struct RawBench {
     pub extent: Extent,
     pub influences: Influences,
@@ -37,7 +34,7 @@ pub struct RawBench {
 }
 
 impl RawBench {
-    /// A strip that is clamped at both ends, over six strain gauges; pressed so often, at so many even places in turn.
+    /// Clamped strip over six strain gauges, pressed at even places in turn.
     pub fn strip(seed: u64, presses: usize, places: usize) -> Result<Self> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let clamp = |at_m: f64| BeamSupport { at_m, kind: BeamSupportKind::Clamped };
@@ -60,7 +57,7 @@ impl RawBench {
         Ok(Self::new(Extent::line(STRIP_M)?, GAUGES, influences, pressed, rng))
     }
 
-    /// A plate on simple edges, over six deflection sensors; pressed twice at each of 10 × 8 places.
+    /// Simply supported plate over six deflection sensors, pressed twice at each of 10 × 8 places.
     pub fn plate(seed: u64) -> Result<Self> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let [length_m, width_m] = PLATE_M;
@@ -92,7 +89,7 @@ impl RawBench {
         Ok(Self::new(Extent::plane(length_m, width_m)?, GAUGES, influences, pressed, rng))
     }
 
-    /// Gauges with random offsets, pressed at these places with random forces.
+    /// Gauges with random offsets, pressed with random forces.
     pub fn new(
         extent: Extent,
         gauges: usize,
@@ -106,20 +103,19 @@ impl RawBench {
         bench
     }
 
-    /// A contact with a random force.
+    /// Contact with a random force.
     pub fn touch(&mut self, position: Position) -> Row {
         let force_n = self.rng.random_range(FORCES_N);
         self.row(Contact { position, force_n })
     }
 
-    /// A contact, and its reading.
     pub fn row(&mut self, contact: Contact) -> Row {
         let reading = self.reading(contact);
         let Contact { position, force_n } = contact;
         Row { position, force_n: Some(force_n), nuisances: Vec::new(), time_s: None, reading }
     }
 
-    /// A noisy reading of a contact, in counts.
+    /// With noise, in counts.
     pub fn reading(&mut self, contact: Contact) -> Vec<f64> {
         let mut reading = self.clean_reading(contact);
         for value in &mut reading {
@@ -129,13 +125,13 @@ impl RawBench {
         reading
     }
 
-    /// The reading of a contact without noise, in counts.
+    /// Without noise, in counts.
     pub fn clean_reading(&self, contact: Contact) -> Vec<f64> {
         let influences = (self.influences)(contact.position).into_iter().zip(&self.offsets);
         influences.map(|(influence, offset)| offset + contact.force_n * influence).collect()
     }
 
-    /// Contacts anywhere within the margins.
+    /// Contacts within the margins.
     pub fn touches(&mut self, count: usize) -> Vec<Row> {
         let size_m = [self.extent.length_m(), self.extent.width_m().unwrap_or(0.0)];
         (0..count)
@@ -148,7 +144,7 @@ impl RawBench {
             .collect()
     }
 
-    /// The setup of a surface without a model.
+    /// Setup without a model.
     pub fn setup(&self) -> Result<Setup> {
         let names: Vec<String> = (0..self.offsets.len()).map(|c| format!("gauge_{c}")).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
@@ -159,7 +155,7 @@ impl RawBench {
         })
     }
 
-    /// Fits the influence estimator of this structure to the presses; contacts have the known force, where there is one.
+    /// Fits the influence estimator to the presses.
     pub fn fit(&self, structure: Structure, known_force_n: Option<f64>) -> Result<InfluenceLocator> {
         let mut setup = self.setup()?;
         if let Some(force_n) = known_force_n {
@@ -171,7 +167,7 @@ impl RawBench {
     }
 }
 
-/// Readings per newton of gauges whose gains differ, in counts.
+/// Counts per newton of gauges with different gains.
 fn raw_influences(
     surface: impl Surface + 'static,
     kind: SensorKind,

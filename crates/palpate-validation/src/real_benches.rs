@@ -1,5 +1,3 @@
-//! Benches with imperfections, beside the same benches in a clean world: errors, coverage of intervals, statuses.
-
 use crate::bench::{Bench, Forces, Knowledge, World, Zero};
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
@@ -8,7 +6,7 @@ use crate::tally::{Figures, Tally};
 use anyhow::{Context, Result};
 use palpate::prelude::{Estimator, GaussianProcessEstimator, Influence, Rig};
 
-/// The benches, by their file in the folder `examples`.
+/// In the folder `examples`.
 pub const BENCHES: [(&str, &str); 4] = [
     ("real-strip", include_str!("../../../examples/real-strip.toml")),
     ("real-finger", include_str!("../../../examples/real-finger.toml")),
@@ -16,7 +14,6 @@ pub const BENCHES: [(&str, &str); 4] = [
     ("real-floor", include_str!("../../../examples/real-floor.toml")),
 ];
 
-/// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "real-benches",
     title: "Benches with imperfections, and the same benches in a clean world",
@@ -27,12 +24,11 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// Repetitions of the experiment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Repetitions {
-    /// Seeds of each bench, from 0 on.
+    /// Per bench, from 0.
     seeds: u64,
-    /// Contacts in use of each seed, about.
+    /// Per seed, about.
     contacts: usize,
 }
 
@@ -65,7 +61,6 @@ fn table() -> Table {
     Table::new(title, &["bench", "surface", "estimator", "world", "tared"], columns)
 }
 
-/// A bench in a world, with the knowledge of its locator.
 struct Case {
     name: &'static str,
     rig: Rig,
@@ -85,7 +80,7 @@ fn cases(benches: &[(&'static str, &'static str)]) -> Result<Vec<Case>> {
 }
 
 impl Case {
-    /// Rows of every estimator by every zero, over all seeds.
+    /// By estimator and zero, over all seeds.
     fn rows(&self, repetitions: Repetitions) -> Result<Vec<Row>> {
         let (world, knowledge) = (self.world.0, self.knowledge.0);
         let bench = Bench { rig: &self.rig, world, knowledge, forces: Forces::UNKNOWN };
@@ -112,7 +107,7 @@ fn cells(figures: &Figures) -> Vec<Option<crate::table::Figure>> {
     cells
 }
 
-/// The estimators that are compared: that of the rig, and the two that learn from a recording.
+/// That of the rig, and two that learn from a recording.
 fn estimators(rig: &Rig) -> Vec<Estimator> {
     let mut estimators = vec![
         Estimator::Influence(Influence::default()),
@@ -124,14 +119,13 @@ fn estimators(rig: &Rig) -> Vec<Estimator> {
     estimators
 }
 
-/// Tallies of an estimator by each of [`ZEROS`].
+/// By each of [`ZEROS`].
 struct EstimatorTallies {
     estimator: String,
     tallies: [Tally; ZEROS.len()],
     failure: Option<String>,
 }
 
-/// Tallies of every estimator over all seeds.
 fn judge(bench: &Bench, estimators: &[Estimator], repetitions: Repetitions) -> Result<Vec<EstimatorTallies>> {
     let begin = |estimator: &Estimator| EstimatorTallies {
         estimator: estimator.kind().to_owned(),

@@ -1,4 +1,4 @@
-//! List of the experiments.
+//! Experiments.
 
 use crate::experiment::Experiment;
 use crate::{
@@ -42,10 +42,10 @@ pub const EXPERIMENTS: &[Experiment] = &[
     mechanics::PLATE_MESH,
 ];
 
-/// The experiments of these names; all of them without a name.
+/// Experiments of these names; all without a name.
 ///
 /// # Errors
-/// A name that no experiment has.
+/// Unknown name.
 pub fn by_names(names: &[String]) -> Result<Vec<Experiment>> {
     if names.is_empty() {
         return Ok(EXPERIMENTS.to_vec());

@@ -1,4 +1,4 @@
-//! Regression that raw benches are compared with: reading = offset + force × Σ coefficient × basis(position), solved and inverted by least squares.
+//! Reference regression: reading = offset + force × Σ coefficient × basis(position), solved and inverted by least squares.
 
 use crate::raw_bench::{MARGIN_M, PLATE_M, RawBench, STRIP_M};
 use anyhow::{Context, Result};
@@ -7,7 +7,6 @@ use palpate::numerics::Cholesky;
 use palpate::prelude::{Position, Row};
 use std::rc::Rc;
 
-/// Basis of a regression, and the grid on which readings are located.
 #[derive(Clone)]
 pub struct Regression {
     basis: Rc<dyn Fn(Position) -> Vec<f64>>,
@@ -15,24 +14,24 @@ pub struct Regression {
     drift: Drift,
 }
 
-/// Model of the offsets in a regression.
+/// Model of the offsets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Drift {
-    /// Offsets are constant.
+    /// Constant.
     None,
-    /// Offsets are linear in the time, or in the number of the row.
+    /// Linear in the time, or the row number.
     Linear,
 }
 
 impl Regression {
-    /// A cubic spline on a strip, with a coefficient for every place that was pressed.
+    /// Cubic spline on a strip, with a coefficient per place.
     pub fn spline(places: usize) -> Self {
         let span_m = STRIP_M - 2.0 * MARGIN_M;
         let basis = move |at: Position| cubic_basis((at.x_m - MARGIN_M) / span_m, places);
         Self { basis: Rc::new(basis), grid: strip_grid(), drift: Drift::None }
     }
 
-    /// Cubic radial basis functions r³ around every place of a plate that was pressed, and a plane.
+    /// Cubic radial basis functions r³ around the places of a plate, and a plane.
     pub fn radial_basis(presses: &[Row]) -> Self {
         let mut centres: Vec<Position> = presses.iter().map(|row| row.position).collect();
         centres.sort_by(Position::cmp_by_x_then_y);
@@ -45,12 +44,10 @@ impl Regression {
         Self { basis: Rc::new(basis), grid: plate_grid(), drift: Drift::None }
     }
 
-    /// The regression with a linear drift of the offsets.
     pub fn with_linear_drift(&self) -> Self {
         Self { drift: Drift::Linear, ..self.clone() }
     }
 
-    /// Distances of the located from the true positions, in mm.
     pub fn errors_mm(&self, presses: &[Row], touches: &[Row]) -> Result<Vec<f64>> {
         let last = presses.last().context("there are no presses")?;
         // Time runs from −1 to 0, so that the constant is the offset at the recording's end.
@@ -84,13 +81,13 @@ impl Regression {
     }
 }
 
-/// Distances from the true positions, in mm, of contacts that are located by least squares with the true influence functions and offsets.
+/// Errors of least squares with the true influence functions and offsets.
 pub fn errors_with_known_functions_mm(bench: &RawBench, touches: &[Row]) -> Vec<f64> {
     let grid = if bench.extent.width_m().is_some() { plate_grid() } else { strip_grid() };
     located_mm(&grid, &bench.offsets, &bench.influences, touches)
 }
 
-/// Contacts are located at the node with the smallest residual, with the best force that is not negative.
+/// Locates at the node with the smallest residual, with the best non-negative force.
 fn located_mm(
     grid: &[Position],
     offsets: &[f64],
@@ -130,7 +127,7 @@ fn plate_grid() -> Vec<Position> {
     (0..=STEPS[0]).flat_map(|i| (0..=STEPS[1]).map(move |j| (i, j))).map(node).collect()
 }
 
-/// The cubic B-splines over even knots from 0 to 1 with fourfold ends (de Boor's recursion).
+/// Cubic B-splines over even knots from 0 to 1 with fourfold ends (de Boor's recursion).
 fn cubic_basis(t: f64, count: usize) -> Vec<f64> {
     let pieces = count - 3;
     let knot = |i: usize| (i.saturating_sub(3).min(pieces)) as f64 / pieces as f64;

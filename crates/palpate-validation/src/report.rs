@@ -1,4 +1,4 @@
-//! Files of an experiment: its tables in Markdown and JSON.
+//! Files of an experiment in Markdown and JSON.
 
 use crate::experiment::{Experiment, Progress, Size};
 use crate::machine::Machine;
@@ -8,26 +8,26 @@ use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::path::Path;
 
-/// Figures of an experiment, and what they depend on.
+/// Figures of an experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
-    /// Name of the experiment.
+    /// Name.
     pub experiment: String,
     /// Title.
     pub title: String,
     /// Method, in two sentences.
     pub method: String,
-    /// Command that makes the report.
+    /// Command to reproduce it.
     pub command: String,
-    /// Version of palpate.
+    /// Version.
     pub palpate: String,
     /// Smallest seed.
     pub seed: u64,
-    /// Number of repetitions.
+    /// Repetitions.
     pub size: Size,
-    /// Machine that the experiment ran on.
+    /// Machine of the run.
     pub machine: Machine,
-    /// The tables.
+    /// Tables.
     pub tables: Vec<Table>,
 }
 
@@ -45,7 +45,7 @@ impl Report {
         Ok(Self { experiment, title, method, command, palpate, seed, size, machine: Machine::this(), tables })
     }
 
-    /// The report in Markdown.
+    /// Text in Markdown.
     pub fn markdown(&self) -> String {
         let Self { title, method, command, palpate, seed, machine, .. } = self;
         let tables: Vec<String> = self.tables.iter().map(Table::markdown).collect();
@@ -55,10 +55,10 @@ impl Report {
         )
     }
 
-    /// Writes NAME.md and NAME.json to a folder, which it makes.
+    /// Writes NAME.md and NAME.json, and makes the folder.
     ///
     /// # Errors
-    /// A folder or file that cannot be written.
+    /// Unwritable folder or file.
     pub fn write(&self, folder: &Path) -> Result<()> {
         std::fs::create_dir_all(folder)
             .with_context(|| format!("cannot make the folder {}", folder.display()))?;
@@ -67,10 +67,10 @@ impl Report {
         write_file(folder, &format!("{}.json", self.experiment), &(json + "\n"))
     }
 
-    /// The stored report of an experiment.
+    /// Reads a stored report.
     ///
     /// # Errors
-    /// A file that is missing or has other keys.
+    /// Missing file, or other keys.
     pub fn read(folder: &Path, name: &str) -> Result<Self> {
         let path = folder.join(format!("{name}.json"));
         let text = std::fs::read_to_string(&path).with_context(|| {
@@ -88,7 +88,7 @@ impl Report {
     }
 }
 
-/// Writes a file under a temporary name that is then renamed.
+/// Writes a temporary file, then renames it.
 fn write_file(folder: &Path, name: &str, text: &str) -> Result<()> {
     let path = folder.join(name);
     let cannot = || format!("cannot write {}", path.display());

@@ -3,24 +3,21 @@
 use crate::table::Figure;
 use std::collections::BTreeMap;
 
-/// Values by the calibration that they belong to. Readings of one calibration share its errors, so they are one cluster.
+/// Values by calibration, each a cluster: its readings share errors.
 #[derive(Clone, Debug, Default)]
 pub struct Sample {
     clusters: BTreeMap<u64, Vec<f64>>,
 }
 
 impl Sample {
-    /// Adds a value of a calibration.
     pub fn add(&mut self, calibration: u64, value: f64) {
         self.clusters.entry(calibration).or_default().push(value);
     }
 
-    /// Number of values.
     pub fn len(&self) -> usize {
         self.clusters.values().map(Vec::len).sum()
     }
 
-    /// True without a value.
     pub fn is_empty(&self) -> bool {
         self.clusters.is_empty()
     }
@@ -29,8 +26,7 @@ impl Sample {
         self.clusters.values().flatten().copied()
     }
 
-    /// Mean x̄ of n values. The standard error is the larger of s/√n and, over G clusters of nᵢ values with the sums sᵢ,
-    /// √(G/(G − 1)·Σ(sᵢ − x̄·nᵢ)²)/n.
+    /// Mean x̄ of n values. Standard error: the larger of s/√n and, over G clusters of nᵢ values with sums sᵢ, √(G/(G − 1)·Σ(sᵢ − x̄·nᵢ)²)/n.
     pub fn mean(&self) -> Option<Figure> {
         let mean = self.values().sum::<f64>() / self.len() as f64;
         let squares: f64 = self.values().map(|value| (value - mean).powi(2)).sum();
@@ -38,8 +34,8 @@ impl Sample {
         self.figure(mean, self.error_of_several(independent.max(self.clustered_error(mean))))
     }
 
-    /// Median. The standard error is the larger of half the distance between the order statistics n/2 ± √n/2, and the standard error of the mean of
-    /// the clusters' medians.
+    /// Median. Standard error: the larger of half the distance between the order statistics n/2 ± √n/2, and that of the mean of the clusters'
+    /// medians.
     pub fn median(&self) -> Option<Figure> {
         let sorted = sorted(self.values());
         let median = median_of_sorted(&sorted)?;
@@ -98,18 +94,15 @@ fn median_of_sorted(sorted: &[f64]) -> Option<f64> {
     }
 }
 
-/// Number of cases, and of those that have a property.
 #[derive(Clone, Debug, Default)]
 pub struct Share(Sample);
 
 impl Share {
-    /// Adds a case of a calibration.
     pub fn add(&mut self, calibration: u64, has_property: bool) {
         self.0.add(calibration, f64::from(u8::from(has_property)));
     }
 
-    /// Share k/n in %. The standard error is the larger of that by clusters and √(p̃(1 − p̃)/n) with p̃ = (k + ½)/(n + 1), which is positive for k = 0
-    /// and k = n too.
+    /// Share k/n in %. Standard error: the larger of that by clusters and √(p̃(1 − p̃)/n), p̃ = (k + ½)/(n + 1), positive also for k = 0 and k = n.
     pub fn percent(&self) -> Option<Figure> {
         let (count, cases) = (self.0.values().sum::<f64>(), self.0.len() as f64);
         let smoothed = (count + 0.5) / (cases + 1.0);
@@ -119,19 +112,18 @@ impl Share {
     }
 }
 
-/// Sums of numerators and denominators by calibration.
+/// Numerators and denominators by calibration.
 #[derive(Clone, Debug, Default)]
 pub struct Ratio {
     clusters: BTreeMap<u64, Vec<[f64; 2]>>,
 }
 
 impl Ratio {
-    /// Adds a case of a calibration.
     pub fn add(&mut self, calibration: u64, numerator: f64, denominator: f64) {
         self.clusters.entry(calibration).or_default().push([numerator, denominator]);
     }
 
-    /// Ratio R = Σa/Σb. The standard error is that of the sum of the residuals a − R·b, by the delta method, divided by Σb.
+    /// Ratio R = Σa/Σb. Standard error: that of Σ(a − R·b), divided by Σb (delta method).
     pub fn figure(&self) -> Option<Figure> {
         let pairs = || self.clusters.values().flatten();
         let [numerator, denominator] = pairs().fold([0.0; 2], |[a, b], pair| [a + pair[0], b + pair[1]]);

@@ -1,5 +1,3 @@
-//! Statuses of every estimator for noise, contacts, and readings that no single contact explains.
-
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::statistics::{Sample, Share};
@@ -20,7 +18,6 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "statuses",
     title: "Statuses of every estimator",
@@ -31,16 +28,14 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// Force of the presses, in newtons.
 const PRESS_N: f64 = 3.0;
-/// Noise of a reading, in metres.
 const NOISE_M: f64 = 5e-6;
-/// Epochs of the back-propagation network at most: the status depends on its influence functions.
+/// Limit; the status depends on the influence functions.
 const NETWORK_EPOCHS: u32 = 4000;
-/// Distance of two contacts, in metres.
+/// Between two contacts.
 const DISTANCE_M: f64 = 0.05;
 
-/// Calibrations of a bench, readings of a figure after each, and pairs of contacts for the most powerful test.
+/// Calibrations, readings per figure, and pairs for the most powerful test.
 #[derive(Clone, Copy, Debug)]
 struct Repetitions {
     calibrations: u64,
@@ -89,7 +84,7 @@ fn run(size: Size, progress: Progress) -> Result<Vec<Table>> {
     Ok(vec![known, unknown, powers])
 }
 
-/// False for an influence method whose readings are not proportional to the force.
+/// False if readings are not proportional to the force.
 fn is_linear(estimator: &Estimator) -> bool {
     match estimator {
         Estimator::Influence(Influence { structure, .. }) => {
@@ -99,7 +94,7 @@ fn is_linear(estimator: &Estimator) -> bool {
     }
 }
 
-/// True for an estimator that is calibrated within a second.
+/// True if calibrated within a second.
 fn is_fast(estimator: &Estimator) -> bool {
     matches!(
         estimator,
@@ -110,28 +105,25 @@ fn is_fast(estimator: &Estimator) -> bool {
     )
 }
 
-/// Readings that a figure counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Readings {
     Noise,
-    /// A contact, of 1.5, 3 and 6 N in turn where the force is unknown.
+    /// 1.5, 3 and 6 N in turn if the force is unknown.
     Contacts,
-    /// Two contacts with the same forces.
+    /// Two contacts of one force.
     Pairs,
-    /// A contact of 3 N and a channel that reads 0.
+    /// 3 N, and a channel that reads 0.
     StuckChannel,
-    /// A contact of 3 N and channels in random order.
+    /// 3 N, and channels in random order.
     ShuffledChannels,
-    /// Random values of up to 10⁻², 1, 10⁹ and 10³⁰⁰ m in turn.
+    /// Random values up to 10⁻², 1, 10⁹ and 10³⁰⁰ m in turn.
     AbsurdValues,
-    /// A contact of a multiple of 3 N.
+    /// Contact of a multiple of 3 N.
     Multiple(f64),
 }
 
-/// Figures of a row.
 const FIGURES: usize = 11;
 
-/// Share of estimates with a property.
 struct EstimateShare {
     name: &'static str,
     readings: Readings,
@@ -139,7 +131,7 @@ struct EstimateShare {
     goal: Goal,
 }
 
-/// Figures of a known or unknown force.
+/// Figures by knowledge of the force.
 fn figures(is_known: bool) -> [EstimateShare; FIGURES] {
     let rejected: fn(&Estimate, f64) -> bool = |estimate, _| is_rejected(estimate);
     let either: fn(&Estimate, f64) -> bool = |estimate, x_m| is_rejected(estimate) || covers(estimate, x_m);
@@ -189,17 +181,15 @@ fn covers(estimate: &Estimate, x_m: f64) -> bool {
     interval.is_some_and(|(low, high)| low <= x_m && x_m <= high)
 }
 
-/// Surface with the knowledge of its locator.
 struct Bench {
     surface: &'static str,
-    /// The surface with its model and sensors.
+    /// With model and sensors.
     physics: Setup,
-    /// Setup of the locator.
+    /// Of the locator.
     setup: Setup,
     training: Training,
 }
 
-/// The benches.
 fn benches() -> Result<[Bench; 5]> {
     let (beam, plate) = (paper_beam(NOISE_M)?, square_plate(NOISE_M)?);
     let extent = beam.surface().extent();
@@ -222,7 +212,7 @@ fn benches() -> Result<[Bench; 5]> {
     ])
 }
 
-/// Reading and x of its contact, in metres; 0 without a contact.
+/// Reading, and x of its contact in metres, or 0.
 type Reading = (Vec<f64>, f64);
 
 impl Bench {
@@ -239,13 +229,11 @@ impl Bench {
         Ok(CleanSensors::new(surface, self.physics.layout()))
     }
 
-    /// Forces of contacts in turn, in newtons.
     fn forces_n(&self) -> [f64; 3] {
         let shares = if self.is_known() { [1.0; 3] } else { [0.5, 1.0, 2.0] };
         shares.map(|share| share * PRESS_N)
     }
 
-    /// Presses of the setup's channels.
     fn presses(&self, seed: u64) -> Result<Recording> {
         let mut presses = self.physics.simulate(&self.training, seed)?;
         if self.setup.surface().model().is_none() {
@@ -259,7 +247,6 @@ impl Bench {
         Ok(Recording::new(self.setup.layout(), "statuses", presses.rows))
     }
 
-    /// Figures of an estimator over all calibrations.
     fn row(&self, estimator: &Estimator, repetitions: Repetitions) -> Result<Row> {
         let figures = figures(self.is_known());
         let mut shares: [Share; FIGURES] = Default::default();
@@ -286,7 +273,7 @@ impl Bench {
         Ok(Row::new(&labels, shares.iter().map(Share::percent).collect()))
     }
 
-    /// Estimates of some readings, with x of their contacts.
+    /// Estimates, with x of their contacts.
     fn located(
         &self,
         locator: &Locator,
@@ -370,7 +357,7 @@ impl Bench {
     }
 }
 
-/// Nodes all over a surface except its edges, where some readings are zero.
+/// Nodes except on the edges, where some readings are zero.
 fn nodes(extent: Extent) -> impl Iterator<Item = Position> {
     let (along, across) = if extent.width_m().is_some() { (48, 48) } else { (400, 2) };
     let width_m = extent.width_m().unwrap_or(0.0);
@@ -380,7 +367,7 @@ fn nodes(extent: Extent) -> impl Iterator<Item = Position> {
     })
 }
 
-/// Local minimum near a position, by steps along and across that are halved where no neighbour is smaller.
+/// Local minimum near a position, by steps that are halved where no neighbour is smaller.
 fn descend(
     extent: Extent,
     (mut least, mut position): (f64, Position),
@@ -416,7 +403,7 @@ fn pair(extent: Extent, force_n: f64, rng: &mut Xoshiro256PlusPlus) -> [Contact;
     [first, second].map(|position| Contact { position, force_n })
 }
 
-/// Random position that is at least 5 % of a side from the edges.
+/// At least 5 % of a side from the edges.
 fn anywhere(extent: Extent, rng: &mut Xoshiro256PlusPlus) -> Position {
     let mut along = |side_m: f64| side_m * rng.random_range(0.05..0.95);
     Position { x_m: along(extent.length_m()), y_m: extent.width_m().map_or(0.0, along) }

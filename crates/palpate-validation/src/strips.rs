@@ -1,5 +1,3 @@
-//! Raw strips and plates beside a regression: still, drifting, pressed beside their places, with noise that differs by place, and with few presses.
-
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::raw_bench::{MARGIN_M, PLATE_M, RawBench, STRIP_M};
@@ -12,7 +10,6 @@ use palpate::prelude::{Contact, Locate, Position, Row, Status};
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Strips and plates beside a regression.
 pub const STRIPS: Experiment = Experiment {
     name: "raw-strips",
     title: "Raw strips and plates, and a regression",
@@ -23,7 +20,6 @@ pub const STRIPS: Experiment = Experiment {
     run: run_strips,
 };
 
-/// Strips that drift while they are pressed.
 pub const DRIFTING: Experiment = Experiment {
     name: "drifting-strips",
     title: "Raw strips that drift while they are calibrated",
@@ -33,7 +29,6 @@ pub const DRIFTING: Experiment = Experiment {
     run: run_drifting,
 };
 
-/// Strips with wrong forces and places.
 pub const SCATTERED: Experiment = Experiment {
     name: "scattered-presses",
     title: "Raw strips with wrong forces and places",
@@ -43,7 +38,6 @@ pub const SCATTERED: Experiment = Experiment {
     run: run_scattered,
 };
 
-/// Strips whose noise differs by place.
 pub const NOISE: Experiment = Experiment {
     name: "noise-by-place",
     title: "Raw strips whose noise differs by place",
@@ -53,7 +47,6 @@ pub const NOISE: Experiment = Experiment {
     run: run_noise,
 };
 
-/// Strips that are pressed a few times.
 pub const FEW: Experiment = Experiment {
     name: "few-presses",
     title: "Raw strips with few presses",
@@ -62,11 +55,11 @@ pub const FEW: Experiment = Experiment {
     run: run_few,
 };
 
-/// Touches of each bench.
+/// Per bench.
 const TOUCHES: usize = 100;
 const SIZES: [(usize, usize); 3] = [(25, 9), (60, 15), (120, 30)];
 
-/// Estimates of touches by a locator: errors in mm, and 95 % intervals that contain x.
+/// Errors in mm, and 95 % intervals that contain x.
 struct Touched {
     errors_mm: Vec<f64>,
     covered: Vec<bool>,
@@ -85,7 +78,7 @@ fn touched(locator: &impl Locate, touches: &[Row]) -> Touched {
     touched
 }
 
-/// Median and mean error of each bench.
+/// Median and mean of each bench.
 #[derive(Default)]
 struct Errors {
     medians_mm: Sample,
@@ -111,13 +104,12 @@ fn median(values: &[f64]) -> f64 {
     palpate::numerics::median(values.to_vec()).unwrap_or(f64::NAN)
 }
 
-/// Errors of a locator over benches beside those of a regression.
 #[derive(Default)]
 struct Comparison {
     own: Errors,
     regression: Errors,
     known_functions: Errors,
-    /// Benches on which the locator's median and mean error are not larger.
+    /// Benches with no larger median and mean error.
     no_larger: [Share; 2],
     covered: Share,
 }
@@ -165,7 +157,6 @@ impl Comparison {
     }
 }
 
-/// Regression of a strip that is pressed at so many places.
 fn spline(places: usize) -> Regression {
     Regression::spline(places.min(15))
 }
@@ -174,7 +165,6 @@ fn size_name((presses, places): (usize, usize)) -> String {
     format!("{presses} presses at {places} places")
 }
 
-/// A bench that is compared with a regression.
 enum StripCase {
     Strip((usize, usize), Structure),
     Plate,
@@ -226,32 +216,31 @@ fn run_strips(size: Size, progress: Progress) -> Result<Vec<Table>> {
     Ok(vec![table])
 }
 
-/// Course of the drift of a gauge from 0 at the first press to 1 at the last, times its amount.
+/// Drift of a gauge from 0 to its amount.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Course {
     Ramp,
-    /// Fast at first, as a board that warms up.
+    /// Fast at first, as in a warming board.
     Settling,
-    /// A random walk whose end has the amount as its standard deviation.
+    /// Random walk whose end has the amount as standard deviation.
     Walk,
 }
 
 const COURSES: [(Course, &str); 3] =
     [(Course::Ramp, "ramp"), (Course::Settling, "settling"), (Course::Walk, "random walk")];
 
-/// Times of the presses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Pace {
-    /// Even, without a column of times.
+    /// Without a column of times.
     Even,
-    /// Uneven, with a pause of two thirds of the time, and a column of times.
+    /// Pause of two thirds of the time, and a column of times.
     Uneven,
 }
 
-/// Smallest and largest drift over a recording, in counts.
+/// Drift over a recording, in counts.
 const AMOUNTS: std::ops::Range<f64> = 6.0..19.0;
 
-/// Drifts every gauge in the course of the presses; gives the presses without the drift, and the drift of each gauge at the end.
+/// Drifts the gauges; returns the presses without drift, and the final drifts.
 fn drift(bench: &mut RawBench, course: Course, pace: Pace) -> (Vec<Row>, Vec<f64>) {
     let still = bench.presses.clone();
     let rows = still.len();
@@ -389,7 +378,7 @@ fn run_drifting(size: Size, progress: Progress) -> Result<Vec<Table>> {
     Ok(vec![table])
 }
 
-/// Standard deviations of the recorded forces, as a share of themselves, and of the recorded positions.
+/// Standard deviations of forces (relative) and positions.
 #[derive(Clone, Copy, Debug)]
 struct PressErrors {
     force: f64,
@@ -403,7 +392,7 @@ const PRESS_ERRORS: [(PressErrors, &str); 4] = [
     (PressErrors { force: 0.03, position_m: 1e-3 }, "both"),
 ];
 
-/// Presses at other places and with other forces than recorded.
+/// Presses other places with other forces than recorded.
 fn record_with_errors(bench: &mut RawBench, errors: PressErrors) {
     let mut presses = std::mem::take(&mut bench.presses);
     for row in &mut presses {
@@ -438,12 +427,11 @@ fn run_scattered(size: Size, progress: Progress) -> Result<Vec<Table>> {
     Ok(vec![table])
 }
 
-/// Noise of touches over that of an untouched board, as a function of the place.
+/// Noise of touches relative to an untouched board, by place.
 type NoiseAt = fn(Position) -> f64;
 
-/// A surface whose noise differs by place.
 struct NoiseCase {
-    /// Presses and places of a strip; `None` for the plate.
+    /// Presses and places; `None` for the plate.
     strip: Option<(usize, usize)>,
     noise: (NoiseAt, &'static str),
 }
@@ -455,7 +443,7 @@ const STRIP_NOISES: [(NoiseAt, &str); 3] = [
 ];
 const PLATE_NOISE: (NoiseAt, &str) = (|at| if at.x_m > 0.5 * PLATE_M[0] { 4.0 } else { 1.0 }, "half");
 
-/// Errors and coverage of touches on the quiet and the noisy half.
+/// On the quiet and the noisy half.
 #[derive(Default)]
 struct Halves {
     errors_mm: [Sample; 2],
@@ -530,7 +518,7 @@ impl NoiseCase {
     }
 }
 
-/// The locator with the noise of an untouched board at all places.
+/// With the noise of an untouched board everywhere.
 fn without_noise_by_place(locator: &ForceLinearLocator) -> Result<ForceLinearLocator> {
     let mut file = serde_json::to_value(locator).context("cannot write the locator")?;
     if let Some(prior) = file.get_mut("prior").and_then(|prior| prior.as_object_mut()) {
@@ -572,7 +560,7 @@ fn run_noise(size: Size, progress: Progress) -> Result<Vec<Table>> {
     Ok(vec![table])
 }
 
-/// Presses of a strip, each at another place, and whether readings are whole counts.
+/// Presses at different places, and whether readings are whole counts.
 struct FewCase {
     presses: usize,
     is_rounded: bool,

@@ -1,4 +1,4 @@
-//! Study files as experiments: their arms are the rows, their seeds the calibrations.
+//! Study files: arms are rows, seeds are calibrations.
 
 use crate::experiment::{Experiment, Progress, Size};
 use crate::statistics::{Sample, Share};
@@ -13,7 +13,6 @@ use palpate_studies::{
 };
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Portions of the beam that are trained.
 pub const PRESS_SPACING: Experiment = Experiment {
     name: "press-spacing",
     title: "How far apart to press",
@@ -23,7 +22,6 @@ pub const PRESS_SPACING: Experiment = Experiment {
     run: |size, progress| PRESS_SPACING_STUDY.run(size, progress),
 };
 
-/// Layouts of eight deflection sensors.
 pub const SENSING_POSITIONS: Experiment = Experiment {
     name: "sensing-positions",
     title: "Where to measure",
@@ -33,7 +31,6 @@ pub const SENSING_POSITIONS: Experiment = Experiment {
     run: |size, progress| SENSING_POSITIONS_STUDY.run(size, progress),
 };
 
-/// Kinds of sensors.
 pub const SENSOR_KINDS: Experiment = Experiment {
     name: "sensor-kinds",
     title: "What to measure",
@@ -115,27 +112,24 @@ fn sensors(arm: &Arm) -> String {
     format!("{}{}", if arm.layout.is_some() { "designed: " } else { "" }, kinds.join(", "))
 }
 
-/// Study file and the table of its results.
 struct StudyTable {
     toml: &'static str,
-    /// Seeds of the full and of the quick size.
+    /// Full and quick.
     seeds: [u64; 2],
-    /// Arms of the quick size.
+    /// Of the quick size.
     is_quick: fn(&Arm) -> bool,
     title: &'static str,
     labels: &'static [&'static str],
     /// Values of the labels.
     names: fn(&Arm) -> Result<Vec<String>>,
-    /// Columns with their names.
     measures: &'static [(Measure, &'static str)],
 }
 
-/// Figure of an arm.
 #[derive(Clone, Copy)]
 enum Measure {
     Error,
     LargestError,
-    /// Mean error in a portion of the study's evaluation.
+    /// Mean error in a portion.
     ErrorIn(usize),
     /// Mean error at the bound in a portion.
     BoundIn(usize),
@@ -200,7 +194,7 @@ impl Measure {
     }
 }
 
-/// Fits of an arm, one for each seed.
+/// One for each seed.
 struct ArmFits<'a> {
     arm: &'a Arm,
     results: &'a ArmResults,
@@ -261,7 +255,7 @@ impl ArmFits<'_> {
     }
 }
 
-/// Mean error inside or outside a portion, in mm.
+/// Mean inside or outside a portion.
 fn error_mm(evaluation: &Evaluation, portion: Portion, inside: bool) -> Option<f64> {
     let located = evaluation.located.iter().filter(|located| portion.contains(located.truth) == inside);
     let located = located.copied().collect();

@@ -5,19 +5,19 @@ use serde::{Deserialize, Serialize};
 /// Value with its Monte-Carlo standard error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Figure {
-    /// Value, in the unit of its column.
+    /// In the unit of the column.
     pub value: f64,
-    /// Standard error, in the same unit; `None` for an exact value, an extreme, or a mean of one value.
+    /// Standard error; `None` for an exact value, an extreme, or a mean of one value.
     pub standard_error: Option<f64>,
 }
 
 impl Figure {
-    /// A figure without a standard error.
+    /// Without a standard error.
     pub const fn exact(value: f64) -> Self {
         Self { value, standard_error: None }
     }
 
-    /// The value, with ± and its standard error if it has one.
+    /// Value ± standard error.
     pub fn text(self, decimals: usize) -> String {
         let Self { value, standard_error } = self;
         match standard_error {
@@ -53,25 +53,25 @@ pub struct Column {
     pub name: String,
     /// Unit, such as "mm".
     pub unit: String,
-    /// Direction of better figures.
+    /// Better direction.
     pub goal: Goal,
     /// Decimals in Markdown.
     pub decimals: usize,
 }
 
 impl Column {
-    /// A column of figures in a unit.
+    /// Column in a unit.
     pub fn new(name: &str, unit: &str, goal: Goal) -> Self {
         let decimals = if unit == "%" { 1 } else { 2 };
         Self { name: name.to_owned(), unit: unit.to_owned(), goal, decimals }
     }
 
-    /// A column of shares in %.
+    /// Column in %.
     pub fn percent(name: &str, goal: Goal) -> Self {
         Self::new(name, "%", goal)
     }
 
-    /// A column of lengths in mm.
+    /// Column in mm.
     pub fn mm(name: &str, goal: Goal) -> Self {
         Self::new(name, "mm", goal)
     }
@@ -80,9 +80,9 @@ impl Column {
 /// Row of a table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// Values of the table's labels, which name the row.
+    /// Values of the table's labels.
     pub labels: Vec<String>,
-    /// Figures by column; `None` for one that the row does not have.
+    /// Figures by column; `None` if missing.
     pub figures: Vec<Option<Figure>>,
     /// Reason for missing figures.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -90,13 +90,13 @@ pub struct Row {
 }
 
 impl Row {
-    /// A row of figures.
+    /// Row of figures.
     pub fn new(labels: &[&str], figures: Vec<Option<Figure>>) -> Self {
         let labels = labels.iter().map(|label| (*label).to_owned()).collect();
         Self { labels, figures, failure: None }
     }
 
-    /// Labels, joined.
+    /// Joined labels.
     pub fn name(&self) -> String {
         self.labels.join(", ")
     }
@@ -111,18 +111,18 @@ pub struct Table {
     pub labels: Vec<String>,
     /// Columns of figures.
     pub columns: Vec<Column>,
-    /// The rows.
+    /// Rows.
     pub rows: Vec<Row>,
 }
 
 impl Table {
-    /// A table without rows.
+    /// Empty table.
     pub fn new(title: &str, labels: &[&str], columns: Vec<Column>) -> Self {
         let labels = labels.iter().map(|label| (*label).to_owned()).collect();
         Self { title: title.to_owned(), labels, columns, rows: Vec::new() }
     }
 
-    /// The table in Markdown: figures with ± and their standard error.
+    /// Table in Markdown.
     pub fn markdown(&self) -> String {
         let named = |column: &Column| match column.unit.as_str() {
             "" => column.name.clone(),

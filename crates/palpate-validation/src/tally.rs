@@ -1,11 +1,8 @@
-//! Estimates beside the truth, summed into figures.
-
 use crate::statistics::{Sample, Share};
 use crate::table::{Column, Figure, Goal};
 use palpate::estimators::interval_check::IntervalCheck;
 use palpate::prelude::{Estimate, Evaluation, Status};
 
-/// Estimates of the contacts of some calibrations.
 #[derive(Clone, Debug, Default)]
 pub struct Tally {
     errors_mm: Sample,
@@ -14,41 +11,35 @@ pub struct Tally {
     statuses: [Share; STATUSES.len()],
     untouched: Share,
     light: Share,
-    /// Coverage of the position at held-out places that each fit reports, in %: by the method, and once widened.
+    /// Reported coverage at held-out places, in %: by the method, and widened.
     reported: [Sample; 2],
 }
 
 const STATUSES: [Status; 3] = [Status::OutsideModel, Status::Ambiguous, Status::NoContact];
 
-/// Figures of a tally.
+/// Distances in mm, shares in %.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Figures {
-    /// Median distance from the true position, in mm.
     pub median_error_mm: Option<Figure>,
-    /// Mean distance, in mm.
     pub mean_error_mm: Option<Figure>,
-    /// Held-out presses within the method's regions of the position, from the check of `fit`, in %; `None` without this check.
+    /// Held-out presses in the method's regions, from the check of `fit`.
     pub reported_before: Option<Figure>,
-    /// Held-out presses within the widened regions, in %.
+    /// Held-out presses in the widened regions.
     pub reported_after: Option<Figure>,
-    /// 95 % regions of the position that contain it, in %.
+    /// 95 % regions that contain the position.
     pub position_coverage: Option<Figure>,
-    /// 95 % intervals of the force that contain it, in %.
+    /// 95 % intervals that contain the force.
     pub force_coverage: Option<Figure>,
-    /// Touches with the status `outside_model`, in %.
     pub outside_model: Option<Figure>,
-    /// Touches with the status `ambiguous`, in %.
     pub ambiguous: Option<Figure>,
-    /// Touches with the status `no_contact`, in %.
+    /// Touches with `no_contact`.
     pub missed: Option<Figure>,
-    /// Untouched readings with the status `no_contact`, in %.
     pub untouched_no_contact: Option<Figure>,
-    /// Touches of five times the smallest detectable force that have another status than `no_contact`, in %.
+    /// Touches of five times the smallest detectable force without `no_contact`.
     pub light_detected: Option<Figure>,
 }
 
 impl Figures {
-    /// Columns of [`Figures::cells`].
     pub fn columns() -> Vec<Column> {
         vec![
             Column::mm("median error", Goal::Smaller),
@@ -61,7 +52,6 @@ impl Figures {
         ]
     }
 
-    /// Errors, coverage and statuses of touches.
     pub fn cells(&self) -> Vec<Option<Figure>> {
         vec![
             self.median_error_mm,
@@ -76,14 +66,12 @@ impl Figures {
 }
 
 impl Tally {
-    /// Adds the check of a fit's intervals, where there is one.
     pub fn add_interval_check(&mut self, calibration: u64, check: Option<&IntervalCheck>) {
         let Some(check) = check else { return };
         let percents = [check.position.before_percent, check.position.after_percent];
         self.reported.iter_mut().zip(percents).for_each(|(sample, percent)| sample.add(calibration, percent));
     }
 
-    /// Adds estimates of touches.
     pub fn add_touches(&mut self, calibration: u64, evaluation: &Evaluation) {
         for located in &evaluation.located {
             self.errors_mm.add(calibration, 1e3 * located.error_m());
@@ -100,23 +88,20 @@ impl Tally {
         }
     }
 
-    /// Adds an untouched reading.
     pub fn add_untouched(&mut self, calibration: u64, estimate: &Estimate) {
         self.untouched.add(calibration, estimate.status == Status::NoContact);
     }
 
-    /// Adds a touch of five times the smallest detectable force.
+    /// Of five times the smallest detectable force.
     pub fn add_light_touch(&mut self, calibration: u64, estimate: &Estimate) {
         self.light.add(calibration, estimate.status != Status::NoContact);
     }
 
-    /// Number of touches.
     #[cfg(test)]
     pub fn touches(&self) -> usize {
         self.errors_mm.len()
     }
 
-    /// The figures of all that was added.
     pub fn figures(&self) -> Figures {
         let [outside_model, ambiguous, missed] = self.statuses.each_ref().map(Share::percent);
         let [reported_before, reported_after] = self.reported.each_ref().map(Sample::mean);

@@ -1,5 +1,3 @@
-//! The founding paper's beam as raw channels, pressed with one weight that is not recorded.
-
 use crate::experiment::{Experiment, Progress, Size};
 use crate::parallel::in_parallel;
 use crate::statistics::{Sample, Share};
@@ -14,7 +12,6 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "weight-without-untouched-rows",
     title: "Raw channels pressed with a weight, never untouched",
@@ -26,7 +23,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 const BOARDS: u64 = 5;
 const CONTACTS_MM: [f64; 5] = [30.0, 50.0, 80.0, 120.0, 200.0];
-/// Places, times at each, and distance of the outermost from the ends in mm; the quick ones first.
+/// Places, times at each, and outermost distance from the ends in mm; quick ones first.
 const CASES: [(usize, usize, f64); 6] =
     [(6, 5, 40.0), (8, 4, 30.0), (12, 2, 20.0), (12, 3, 16.7), (20, 2, 20.0), (12, 10, 20.0)];
 
@@ -83,7 +80,7 @@ fn rows(case: (usize, usize, f64), readings: u64) -> Result<Vec<TableRow>> {
     Ok(rows)
 }
 
-/// A reading of the weight in units of the noise.
+/// In units of the noise.
 fn weight(beam: &Setup, contact_mm: f64, rng: &mut Xoshiro256PlusPlus) -> Result<Row> {
     let surface = beam.surface().model().context("the beam has a model")?;
     let position = Position::along(mm(contact_mm));

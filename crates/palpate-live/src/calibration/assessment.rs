@@ -1,5 +1,3 @@
-//! Assessment of a calibration.
-
 use palpate_design::positions::{PositionDesign, next_press};
 use palpate_estimators::evaluation::{Evaluation, cross_validate};
 use palpate_estimators::fit::FitTask;
@@ -12,7 +10,7 @@ const FOLDS: usize = 5;
 /// Errors of cross-validation, in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeldOut {
-    /// Number of folds.
+    /// Folds.
     pub folds: usize,
     /// Median error.
     pub median_m: f64,
@@ -39,7 +37,7 @@ impl Gain {
 /// Assessment of a calibration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Assessment {
-    /// Held-out errors; `None` with too few positions, or after a failed fit.
+    /// Held-out errors; `None` with too few positions or a failed fit.
     pub held_out: Option<HeldOut>,
     /// Held-out error of each press in metres; empty if unknown.
     pub errors_m: Vec<Option<f64>>,
@@ -50,10 +48,10 @@ pub struct Assessment {
 }
 
 impl Assessment {
-    /// Assesses a recording of a rig, with a new fit for every fold.
+    /// Assesses a recording of a rig, with a fit for every fold.
     ///
     /// # Errors
-    /// [`Cancelled`] by the watch.
+    /// [`Cancelled`].
     pub fn new(rig: &Rig, recording: &Recording, seed: u64, watch: Watch) -> Result<Self, Cancelled> {
         let mut own = Self::default();
         if recording.distinct_positions().len() >= FOLDS {

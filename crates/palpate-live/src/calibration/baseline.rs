@@ -1,13 +1,10 @@
-//! Baseline: untouched reading and noise of each channel.
-
 use super::stretch::{LONGEST_SPAN, REST_SPAN, Stretch, mean};
 
 /// Limit of noise, in standard deviations; Gaussian noise exceeds it once in 10¹⁴ values.
 pub const NOISE_LIMIT_SD: f64 = 8.0;
 /// Limit on the difference between half means at rest, in its standard deviations.
 const REST_SD: f64 = 3.5;
-/// Limit on the ratio of the variance about a line to that of successive differences; 25-fold repeated values
-/// reach it.
+/// Limit on the variance about a line over that of successive differences; 25-fold repeated values reach it.
 const LARGEST_CORRELATION: f64 = 25.0;
 const MOST_DECIMALS: i32 = 9;
 
@@ -27,8 +24,7 @@ pub struct Baseline {
 }
 
 impl Baseline {
-    /// Learns the baseline of a stretch at rest, or with a steady drift over [`LONGEST_SPAN`]; `None`
-    /// otherwise.
+    /// Baseline of a stretch at rest, or with a steady drift over [`LONGEST_SPAN`]; `None` otherwise.
     pub fn learn(stretch: &Stretch) -> Option<Self> {
         let readings = stretch.for_noise()?;
         let span_s = -readings.first()?.0;
@@ -107,11 +103,11 @@ impl Baseline {
 }
 
 impl Noise {
-    /// Returns the noise of a channel; `None` if the channel moves.
+    /// Noise of a channel; `None` if the channel moves.
     ///
     /// The variance of independent readings is half the mean square of successive differences (von Neumann
-    /// 1941), unaffected by slow drift. Filtered or repeated values have smaller differences: the ratio to
-    /// the variance about a line is the correlation.
+    /// 1941), unaffected by slow drift. Filtered or repeated values have smaller differences: the ratio to the
+    /// variance about a line is the correlation.
     fn learn(readings: &[(f64, &[f64])], channel: usize) -> Option<Self> {
         let values: Vec<(f64, f64)> =
             readings.iter().map(|(at_s, reading)| (*at_s, reading[channel])).collect();

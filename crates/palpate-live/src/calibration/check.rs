@@ -1,5 +1,3 @@
-//! Check of a locator at fresh places.
-
 use super::plan::{PlaceGrid, Weights};
 use super::press::Press;
 use palpate_estimators::estimator::Locator;
@@ -11,11 +9,10 @@ use palpate_mechanics::surface::Extent;
 use palpate_rig::Rig;
 use std::path::{Path, PathBuf};
 
-/// Number of fresh places of a check.
+/// Fresh places of a check.
 pub const CHECK_PLACES: usize = 5;
 
-/// Returns presses between the calibrated places, with the weights or `depths_m` in turn; empty for one
-/// place.
+/// Presses between the calibrated places, with the weights or `depths_m` in turn; empty for one place.
 pub fn check_presses(rig: &Rig, rows: &[Row], weights: Weights, depths_m: &[f64]) -> Vec<Press> {
     let extent = rig.setup.surface().extent();
     let calibrated: Vec<Position> = rows.iter().filter(|row| row.touches()).map(|row| row.position).collect();
@@ -28,7 +25,7 @@ pub fn check_presses(rig: &Rig, rows: &[Row], weights: Weights, depths_m: &[f64]
     places.map(|(position, (force_n, depth_m))| Press { position, force_n, depth_m }).collect()
 }
 
-/// Returns a place far from calibrated ones in each of [`CHECK_PLACES`] segments of the longer side.
+/// Place far from calibrated ones in each of [`CHECK_PLACES`] segments of the longer side.
 fn fresh_places(calibrated: &[Position], extent: Extent) -> Vec<Position> {
     const CANDIDATES: usize = 40;
     /// Share of the largest distance that counts as far.
@@ -76,7 +73,7 @@ fn nearest_m(at: Position, places: &[Position]) -> f64 {
     places.iter().map(|place| at.distance_m(*place)).fold(f64::INFINITY, f64::min)
 }
 
-/// Returns `presses-check.csv` beside the file of presses, or the first free number.
+/// `presses-check.csv` beside the file of presses, or the first free number.
 pub fn check_path(presses: &Path) -> PathBuf {
     let stem = presses.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let suffix =
@@ -92,7 +89,7 @@ pub fn check_path(presses: &Path) -> PathBuf {
     named(number)
 }
 
-/// A checked place.
+/// Checked place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CheckedPlace {
     /// Requested place.
@@ -101,14 +98,14 @@ pub struct CheckedPlace {
     pub estimate: Position,
     /// Distance between both, in metres.
     pub error_m: f64,
-    /// True for a place in the 95 % region; `None` without regions.
+    /// True if the 95 % region contains the place; `None` without regions.
     pub covered: Option<bool>,
 }
 
 /// Outcome of a check.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Check {
-    /// Places in the order of the presses.
+    /// Places in press order.
     pub places: Vec<CheckedPlace>,
     /// Median error, in metres.
     pub median_m: f64,

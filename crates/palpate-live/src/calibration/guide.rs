@@ -52,7 +52,7 @@ const SILENCE: Duration = Duration::from_secs(5);
 pub enum AwaitedStep {
     /// Learning of the baseline.
     Untouched,
-    /// The next press.
+    /// Next press.
     Press,
     /// Rest of the reading.
     Rest,
@@ -82,7 +82,7 @@ pub enum Progress {
     Pressed {
         /// Untouched row before it; `None` if already recorded.
         untouched: Option<RestingRow>,
-        /// The press.
+        /// Press.
         press: RestingRow,
     },
     /// The last press grew and is replaced.
@@ -106,7 +106,6 @@ struct Touch {
     doubtful_since: Option<Duration>,
 }
 
-/// Growth of a recorded touch.
 #[derive(Clone, Debug, Default)]
 struct Growth {
     since: Duration,
@@ -128,7 +127,6 @@ pub struct Guide {
     is_sample_and_hold: bool,
     stretch: Stretch,
     baseline: Option<Baseline>,
-    /// Last untouched row at rest.
     untouched: Option<RestingRow>,
     /// Untouched mean learnt or recorded last.
     reference: Vec<f64>,
@@ -145,7 +143,7 @@ pub struct Guide {
 }
 
 impl Guide {
-    /// Creates the guide of a plan.
+    /// Guide of a plan.
     pub fn new(plan: Vec<Press>) -> Self {
         let waiting = if plan.is_empty() { AwaitedStep::Nothing } else { AwaitedStep::Untouched };
         Self {
@@ -180,7 +178,7 @@ impl Guide {
         self.plan.get(self.next).map(|press| (self.next, *press))
     }
 
-    /// Number of recorded presses of the plan.
+    /// Recorded presses of the plan.
     pub fn taken(&self) -> usize {
         self.next
     }
@@ -195,7 +193,7 @@ impl Guide {
         self.awaited
     }
 
-    /// True if the source repeats readings, because its sensors are slower.
+    /// True if the source repeats readings: its sensors are slower.
     pub fn is_sample_and_hold(&self) -> bool {
         self.is_sample_and_hold
     }

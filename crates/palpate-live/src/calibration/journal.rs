@@ -1,5 +1,3 @@
-//! File of presses.
-
 use super::trace::Trace;
 use palpate_estimators::recording::{self, Column, Columns, Recording, Row};
 use palpate_estimators::setup::Setup;
@@ -27,7 +25,7 @@ pub enum JournalError {
     /// A column of the recordings has unknown values.
     #[error("presses are recorded without the nuisance coordinate {column}")]
     Nuisance {
-        /// The column.
+        /// Column.
         column: Column,
     },
     /// The columns of the recordings have no names.
@@ -36,7 +34,7 @@ pub enum JournalError {
     /// The file cannot be written.
     #[error("cannot write {}: {error}", path.display())]
     Write {
-        /// The file.
+        /// File.
         path: PathBuf,
         /// Cause.
         error: std::io::Error,
@@ -44,7 +42,7 @@ pub enum JournalError {
 }
 
 impl JournalError {
-    /// Returns the remedy.
+    /// Remedy.
     pub fn help(&self) -> &'static str {
         match self {
             Self::Nuisance { .. } => "remove `nuisance` from [recording], or record with another program",
@@ -60,7 +58,7 @@ const DEPTH: &str = "depth_mm";
 const BETWEEN_RUNS_S: f64 = 60.0;
 
 impl Journal {
-    /// Creates a journal with earlier rows; the next press writes the file.
+    /// Journal with earlier rows; the next press writes the file.
     ///
     /// # Errors
     /// [`JournalError`] of [`Self::columns`].
@@ -85,7 +83,7 @@ impl Journal {
         Self { traces, ..self }
     }
 
-    /// Returns the columns: those of the rig.
+    /// Columns of the rig.
     ///
     /// For a machine, a length among the nuisance coordinates is the depth; otherwise several depths need the
     /// column `depth_mm`.
@@ -131,17 +129,17 @@ impl Journal {
         }
     }
 
-    /// Number of recorded presses.
+    /// Recorded presses.
     pub fn presses(&self) -> usize {
         self.rows.iter().filter(|row| row.touches()).count()
     }
 
-    /// The file.
+    /// File.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Writes a row to disk; `depth_m` is the depth of a machine.
+    /// Writes a row to disk; `depth_m` is that of a machine.
     ///
     /// # Errors
     /// [`JournalError::Write`].

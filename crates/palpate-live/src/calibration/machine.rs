@@ -1,5 +1,3 @@
-//! Machine of a calibration.
-
 use super::guide::AwaitedStep;
 use super::press::Press;
 use super::run::{Calibration, Note};
@@ -25,7 +23,7 @@ pub enum MachineError {
     /// A channel is saturated.
     #[error("channel `{name}` reads the end of its range: the machine was stopped")]
     Saturated {
-        /// The channel.
+        /// Channel.
         name: String,
     },
     /// Overload of the load cell.
@@ -33,15 +31,15 @@ pub enum MachineError {
         "the load cell reads {force_n:.3} N, more than the limit of {limit_n} N: the machine was stopped"
     )]
     Overload {
-        /// The force.
+        /// Force.
         force_n: f64,
-        /// The limit.
+        /// Limit.
         limit_n: f64,
     },
     /// No readings arrive.
     #[error("no reading came for {} s: the machine was stopped", SILENT.as_secs())]
     Silent,
-    /// A stop by hand.
+    /// Stop by hand.
     #[error("the machine was stopped by hand")]
     ByHand,
     /// No page is connected.
@@ -61,7 +59,7 @@ pub enum MachineError {
 }
 
 impl MachineError {
-    /// Returns the remedy.
+    /// Remedy.
     pub fn help(&self) -> &'static str {
         match self {
             Self::Stage(StageError::Line(_)) => "check that it is on, and at this port",
@@ -145,12 +143,12 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// Creates a machine, not homed yet.
+    /// Machine, not homed yet.
     pub fn new(thread: StageThread, force_limit_n: Option<f64>, now: Duration) -> Self {
         Self::with_tasks(thread, force_limit_n, now, None)
     }
 
-    /// Creates a machine for set-up: homing, then the tasks of [`Self::ask`].
+    /// Creates a machine for set-up: homing, then [`Self::ask`].
     pub fn to_set_up(thread: StageThread, stage: Stage, now: Duration) -> Self {
         let limit_n = stage.force_limit_n;
         Self::with_tasks(thread, limit_n, now, Some(SetUp::new(stage)))
@@ -193,7 +191,7 @@ impl Machine {
         self.press
     }
 
-    /// Position after the last move, in machine coordinates; `None` before homing.
+    /// Machine coordinates after the last move; `None` before homing.
     pub fn position_m(&self) -> Option<[f64; 3]> {
         self.at_m
     }
@@ -244,7 +242,7 @@ impl Machine {
     /// Executes the next step; must be called often.
     ///
     /// # Errors
-    /// [`MachineError`], which ends the work.
+    /// [`MachineError`] that ends the work.
     pub fn step(
         &mut self,
         now: Duration,

@@ -1,5 +1,3 @@
-//! Plan of presses.
-
 use super::press::Press;
 use palpate_estimators::arrangement::{Arrangement, ArrangementError};
 use palpate_estimators::recording::{Row, is_same_force};
@@ -40,11 +38,10 @@ impl Weights {
     }
 }
 
-/// Returns the presses that `before` lacks: training positions × repeats, and × `depths_m` for a machine. The
-/// depth of a row is its nuisance coordinate.
+/// Presses that `before` lacks: training positions × repeats, and × `depths_m` for a machine. The depth of a
+/// row is its nuisance coordinate.
 ///
-/// Presses to several depths have no force. The second weight of a person follows at every other place; a
-/// person's places are on a ruler.
+/// Presses to several depths have no force. A person's second weight follows at every other place, on a ruler.
 ///
 /// # Errors
 /// [`PlanError`] of the positions.
@@ -82,7 +79,6 @@ pub fn plan(rig: &Rig, weights: Weights, depths_m: &[f64], before: &[Row]) -> Re
     Ok(first.chain(second).flat_map(left).collect())
 }
 
-/// Grid of places on a ruler.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PlaceGrid {
     steps_per_m: f64,
@@ -91,7 +87,7 @@ pub(super) struct PlaceGrid {
 
 impl PlaceGrid {
     /// Ruler of a rig; `None` for listed places. The step is 1, 0.1, 0.01 or 0.001 mm: at most a fifth of the
-    /// gap between places, and at most the gap to the edge. Places thus stay distinct and off the edge.
+    /// gap between places, and at most the gap to the edge, so places stay distinct and off the edge.
     pub fn for_places(rig: &Rig) -> Result<Option<Self>, PlanError> {
         let (training, extent) = (rig.training()?, rig.setup.surface().extent());
         if let Arrangement::Explicit(_) = training.arrangement {

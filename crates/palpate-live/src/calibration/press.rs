@@ -1,5 +1,3 @@
-//! Planned press.
-
 use palpate_mechanics::contact::Position;
 
 /// Planned press.

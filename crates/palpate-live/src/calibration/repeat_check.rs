@@ -55,7 +55,6 @@ impl fmt::Display for RetakeReason {
 #[derive(Clone, Debug, PartialEq)]
 pub struct TouchReading {
     pub reading: Vec<f64>,
-    /// Deviation from the untouched reading.
     pub deviation: Vec<f64>,
 }
 
@@ -73,7 +72,6 @@ impl PreviousPress {
     }
 }
 
-/// Earlier presses.
 #[derive(Clone, Debug, Default)]
 pub struct RepeatCheck {
     previous: Vec<PreviousPress>,
@@ -105,8 +103,6 @@ impl RepeatCheck {
         own
     }
 
-    /// Reason to request a press again.
-    ///
     /// A second press that confirms the first is recorded.
     pub fn retake_reason(
         &self,
@@ -160,7 +156,6 @@ impl RepeatCheck {
         self.previous.iter().map(|past| baseline.size_of(&past.touch.deviation)).fold(0.0, f64::max)
     }
 
-    /// Adds a change between untouched rows.
     pub fn add_residue(&mut self, change: Vec<f64>, baseline: &Baseline) {
         if baseline.length_of(&change) > baseline.length_of(&self.residue) {
             self.residue = change;
@@ -173,7 +168,6 @@ impl RepeatCheck {
         self.requests += 1;
     }
 
-    /// Adds a press.
     pub fn record(&mut self, press: &Press, touch: TouchReading) {
         let Press { position, force_n, depth_m } = *press;
         self.previous.push(PreviousPress { position, force_n, depth_m, touch });
@@ -191,7 +185,6 @@ impl RepeatCheck {
         self.outgrown = Some(deviation);
     }
 
-    /// Ends the repeated requests.
     pub fn forget_request(&mut self) {
         self.refused = None;
         self.requests = 0;
@@ -199,8 +192,6 @@ impl RepeatCheck {
     }
 }
 
-/// Relative difference between two touches.
-///
 /// Known force: minimum over deviations and readings, because readings under load agree despite hysteresis.
 /// Unknown force: difference in direction.
 fn difference_share(

@@ -1,5 +1,3 @@
-//! Repeatability of presses at one place.
-
 use super::press::Press;
 use palpate_estimators::recording::Row;
 use palpate_mechanics::contact::Position;
@@ -9,15 +7,15 @@ use palpate_mechanics::contact::Position;
 pub struct Place {
     /// Position.
     pub position: Position,
-    /// Number of recorded presses.
+    /// Recorded presses.
     pub recorded: usize,
-    /// Number of remaining presses.
+    /// Remaining presses.
     pub left: usize,
     /// Relative standard deviation in %; `None` for one press, or different forces.
     pub spread_percent: Option<f64>,
 }
 
-/// Sorted places of past and future presses.
+/// Places of past and future presses, sorted.
 pub fn places(rows: &[Row], to_come: &[Press]) -> Vec<Place> {
     let mut positions: Vec<Position> = rows
         .iter()

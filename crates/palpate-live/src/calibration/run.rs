@@ -1,5 +1,3 @@
-//! Calibration in progress.
-
 use super::guide::{AwaitedStep, Guide, Progress, RestingRow};
 use super::journal::{Journal, JournalError};
 use super::press::Press;
@@ -58,7 +56,7 @@ pub enum Note {
     Replaced,
     /// The untouched surface was recorded, on disk if presses have a force.
     Untouched,
-    /// The source repeats readings, because its sensors are slower.
+    /// The source repeats readings: its sensors are slower.
     RepeatedReadings,
     /// The press is requested again.
     AskedAgain(RetakeReason),
@@ -101,7 +99,7 @@ impl Calibration {
     /// channel.
     ///
     /// # Errors
-    /// [`ColumnsError`] unless every channel is named once.
+    /// [`ColumnsError`].
     pub fn new(
         setup: &Setup,
         stage: Option<&Stage>,
@@ -141,7 +139,7 @@ impl Calibration {
         })
     }
 
-    /// The guide.
+    /// Guide.
     pub fn guide(&self) -> &Guide {
         &self.guide
     }
@@ -151,12 +149,12 @@ impl Calibration {
         &self.journal
     }
 
-    /// Number of invalid frames, by cause.
+    /// Invalid frames by cause.
     pub fn bad_frames(&self) -> &BTreeMap<BadFrame, u64> {
         self.frames.bad_frames()
     }
 
-    /// Number of readings.
+    /// Readings.
     pub fn readings(&self) -> u64 {
         self.frames.readings()
     }
@@ -358,7 +356,7 @@ impl Calibration {
         self.guide.relearn();
     }
 
-    /// Deletes a press, counted from 0; false if missing. [`Self::replan`] requests it again.
+    /// Deletes a press, counted from 0; false if missing.
     ///
     /// # Errors
     /// [`JournalError`] of the file.

@@ -1,5 +1,3 @@
-//! Set-up of a machine, without recording.
-
 use super::press::Press;
 use super::run::Calibration;
 use super::touch_off::{TouchOff, TouchOffAction, TouchOffFailure};
@@ -13,7 +11,7 @@ use std::time::Duration;
 /// Longest jog, in metres.
 pub const LONGEST_JOG_M: f64 = 0.01;
 
-/// Returns the distinct places of a plan.
+/// Distinct places of a plan.
 pub fn dry_run(plan: &[Press]) -> Vec<Position> {
     let mut places: Vec<Position> = plan.iter().map(|press| press.position).collect();
     places.dedup();
@@ -38,7 +36,7 @@ pub enum SetUpTask {
 pub enum SetUpNote {
     /// A dry run is above this place.
     Above(Position),
-    /// Number of places of a finished dry run.
+    /// Places of a finished dry run.
     DryRunEnded(usize),
     /// Position after a jog, in machine coordinates.
     At([f64; 3]),

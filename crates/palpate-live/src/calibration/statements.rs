@@ -1,5 +1,3 @@
-//! Statements of the operator.
-
 use super::plan::Weights;
 use palpate_estimators::recording::{Row, is_same_force};
 use palpate_numerics::OutOfRange;
@@ -64,8 +62,8 @@ impl Statements {
         Weights { force_n, second_n: self.second_force_n.filter(|_| !self.force_is_known) }
     }
 
-    /// Single force of all presses in newtons, if a second is necessary: without a model, an unknown force in
-    /// use requires two.
+    /// Single force of all presses in newtons, if a second is necessary: without a model, unknown forces
+    /// require two.
     pub fn single_weight_n(&self, rig: &Rig, force_n: Option<f64>) -> Option<f64> {
         let has_forces = rig.setup.recording_columns().force.is_some();
         let asks = rig.setup.surface().model().is_none()

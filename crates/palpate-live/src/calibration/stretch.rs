@@ -1,5 +1,3 @@
-//! Recent readings.
-
 use palpate_estimators::recording::{RepeatCause, RepeatCounts, is_same_reading};
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -76,7 +74,7 @@ impl Stretch {
         (self.readings.front()?.0 <= begin).then_some(begin)
     }
 
-    /// True if a source at rest repeats readings, because its sensors are slower.
+    /// True if a source at rest repeats readings: its sensors are slower.
     pub fn is_sample_and_hold(&self) -> bool {
         let Some(reading) = self.last() else { return false };
         let mut counts = RepeatCounts::new(reading.len());

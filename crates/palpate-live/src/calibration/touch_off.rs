@@ -1,7 +1,7 @@
 //! Touch-off: height at which the finger touches the surface.
 //!
-//! The finger descends in steps with rests: a coarse pass from the height of travel, a lift that must restore
-//! the untouched reading, and a fine pass.
+//! The finger descends in steps: a coarse pass from the height of travel, a lift that must restore the
+//! untouched reading, and a fine pass.
 
 use super::baseline::{Baseline, NOISE_LIMIT_SD};
 use super::guide::ONSET_READINGS;

@@ -1,11 +1,8 @@
-//! Traces of presses.
-
 use super::repeats::distance;
 use std::collections::VecDeque;
 use std::time::Duration;
 
 const SHOWN: Duration = Duration::from_secs(4);
-/// Limits on readings, and on points.
 const MOST_READINGS: usize = 8192;
 const MOST_POINTS: usize = 120;
 /// Half the shortest rest before an untouched reading.
@@ -14,7 +11,7 @@ const BEFORE_S: f64 = 0.2;
 /// Size of a press over time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
-    /// Seconds relative to the recording (≤ 0), and relative distance from the untouched reading in %.
+    /// Seconds relative to the recording (≤ 0), and distance from the untouched reading in %.
     pub points: Vec<(f64, f64)>,
 }
 

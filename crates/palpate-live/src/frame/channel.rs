@@ -1,5 +1,3 @@
-//! Channels of frames.
-
 use palpate_estimators::recording::Column;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::units::Unit;
@@ -16,7 +14,7 @@ pub struct Channel {
 }
 
 impl Channel {
-    /// Returns the channels of a setup in order.
+    /// Channels of a setup in order.
     pub fn all_of(setup: &Setup) -> Vec<Self> {
         let columns = setup.recording_columns().channels;
         let sensors = setup.layout().sensors().iter();

@@ -1,5 +1,3 @@
-//! Decoder of frames, text or binary.
-
 use super::binary;
 use super::names::{Names, Role};
 use super::text::{Line, TextReader, is_text};
@@ -11,7 +9,7 @@ pub const LONGEST_MESSAGE: usize = 1 << 17;
 /// Quotation of 80 characters of four bytes.
 const QUOTED: usize = 320;
 
-/// Decoder that detects text (a valid line) or binary frames (a valid checksum).
+/// Decoder that detects text by a valid line, binary frames by a checksum.
 #[derive(Debug)]
 pub struct Decoder {
     text: TextReader,
@@ -40,7 +38,7 @@ enum Form {
 /// Columns that do not name every channel once.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ColumnsError {
-    /// A channel without a column.
+    /// Channel without a column.
     #[error(
         "the columns {columns} have no channel `{channel}`; name every channel, and anything else that a line has"
     )]
@@ -50,7 +48,7 @@ pub enum ColumnsError {
         /// Channel.
         channel: String,
     },
-    /// A channel with two columns.
+    /// Channel with two columns.
     #[error("the columns {columns} have a channel twice; there are {channels} channels")]
     Twice {
         /// Columns.
@@ -61,7 +59,7 @@ pub enum ColumnsError {
 }
 
 impl Decoder {
-    /// Creates a decoder at the start of a stream.
+    /// Decoder at the start of a stream.
     pub fn new(channels: &[Channel]) -> Self {
         Self {
             text: TextReader::new(Names::new(channels)),
@@ -98,7 +96,7 @@ impl Decoder {
         Ok(())
     }
 
-    /// Begins a stream. Header names are kept: a board that was only unplugged does not repeat them.
+    /// Begins a stream; keeps header names, which an unplugged board does not repeat.
     pub fn open(&mut self) {
         self.form = Form::Unknown;
         self.text.open();
@@ -106,7 +104,7 @@ impl Decoder {
         (self.torn_line, self.torn_binary, self.skips) = (false, false, false);
     }
 
-    /// Begins a stream amid a frame, which is skipped unless it is certainly whole.
+    /// Begins a stream amid a frame, skipped unless certainly whole.
     pub fn join(&mut self) {
         self.open();
         (self.torn_line, self.torn_binary) = (true, true);
@@ -138,7 +136,7 @@ impl Decoder {
         }
     }
 
-    /// A quotation of the last bad frame.
+    /// Quotation of the last bad frame.
     pub fn last_bad(&self) -> Option<String> {
         (!self.last_bad.is_empty()).then(|| quote(&self.last_bad))
     }
@@ -189,7 +187,7 @@ impl Decoder {
         end.map_or(bytes.len(), |end| end + 1)
     }
 
-    /// Returns the number of bytes, and whether the end was reached.
+    /// Number of bytes, and whether the end was reached.
     fn hold(
         &mut self,
         bytes: &[u8],

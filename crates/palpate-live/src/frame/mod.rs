@@ -19,7 +19,7 @@ pub use reader::FrameReader;
 
 use std::time::Duration;
 
-/// A decoded frame.
+/// Decoded frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// One finite value per channel, in SI units or raw.
@@ -36,17 +36,17 @@ pub struct Frame {
 pub enum BadFrame {
     /// Too many bytes without an end.
     TooLong,
-    /// A wrong number of values.
+    /// Wrong number of values.
     Channels,
-    /// A missing channel.
+    /// Missing channel.
     MissingChannel,
     /// A value that is not finite.
     NotANumber,
-    /// A wrong unit.
+    /// Wrong unit.
     OtherUnit,
     /// Neither text nor a binary frame.
     Encoding,
-    /// A wrong checksum.
+    /// Wrong checksum.
     Checksum,
     /// Invalid length, type or JSON.
     Malformed,
@@ -79,7 +79,7 @@ impl BadFrame {
         }
     }
 
-    /// Returns the remedy for channels with these labels.
+    /// Remedy for channels with these labels.
     pub fn remedy<'a>(self, labels: impl IntoIterator<Item = &'a str>) -> String {
         let labels: Vec<&str> = labels.into_iter().collect();
         let labels = labels.join("`, `");
@@ -108,7 +108,6 @@ mod tests {
     use super::Channel;
     use palpate_mechanics::units::Unit;
 
-    /// Raw channels with these labels, of sensors s1, s2, …
     pub fn channels(labels: &[&str]) -> Vec<Channel> {
         let channel = |(i, label): (usize, &&str)| Channel {
             name: format!("s{}", i + 1),

@@ -1,11 +1,8 @@
-//! Names and roles of the values of a frame.
-
 use super::{BadFrame, Channel, Frame, printed};
 use std::time::Duration;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Role {
-    /// Index of a channel.
     Channel(usize),
     /// Time with its unit in seconds.
     Time(f64),

@@ -133,7 +133,7 @@ const NO_NUMBERS: [&str; 16] = [
     "null", "none", "na", "ol",
 ];
 
-/// A symbol such as `mV`, `°C`, `%`, `m/s2`.
+/// Symbol such as `mV`, `°C`, `%`, `m/s2`.
 fn is_unit(word: &str) -> bool {
     let is_sign = |letter: char| letter.is_alphabetic() || "%°²³".contains(letter);
     let is_part = |letter: char| is_sign(letter) || letter.is_ascii_digit() || "/^*·".contains(letter);
@@ -145,7 +145,6 @@ fn is_unit(word: &str) -> bool {
 
 const SEPARATORS: [char; 4] = [',', ';', '|', '\t'];
 
-/// Items of a line; `None` for other text.
 pub fn items<'a>(
     line: &'a str,
     decimal_comma: bool,
@@ -274,8 +273,8 @@ pub fn is_time(text: &str) -> bool {
     time_length(text) == Some(text.len())
 }
 
-/// Returns the seconds of the day, or since 1970 with a date, without the zone. `None` without milliseconds:
-/// such a clock does not resolve readings.
+/// Seconds of the day, or since 1970 with a date, without the zone. `None` without milliseconds: such a clock
+/// does not resolve readings.
 pub fn time_s(text: &str) -> Option<f64> {
     let text = text.trim();
     if !is_time(text) {

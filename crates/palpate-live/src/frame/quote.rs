@@ -1,5 +1,3 @@
-//! Quotation of bytes in messages.
-
 use std::fmt::Write;
 
 const MOST: usize = 80;

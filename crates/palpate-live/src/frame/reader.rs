@@ -1,5 +1,3 @@
-//! Reader of frames.
-
 use super::{BadFrame, Channel, ColumnsError, Decoder, Frame};
 use crate::input::Arrival;
 use std::collections::BTreeMap;
@@ -16,7 +14,7 @@ pub struct FrameReader {
 }
 
 impl FrameReader {
-    /// Creates a reader of frames with these channels.
+    /// Reader of frames with these channels.
     pub fn new(channels: &[Channel]) -> Self {
         Self {
             decoder: Decoder::new(channels),
@@ -36,7 +34,7 @@ impl FrameReader {
         self.decoder.set_columns(columns)
     }
 
-    /// Returns the readings of an arrival.
+    /// Readings of an arrival.
     pub fn receive(&mut self, arrival: &Arrival) -> Vec<Frame> {
         let mut frames = Vec::new();
         let hand_on = |frame| frames.push(frame);
@@ -84,7 +82,7 @@ impl FrameReader {
         self.count_bad(cause);
     }
 
-    /// Number of readings.
+    /// Readings.
     pub fn readings(&self) -> u64 {
         self.readings
     }

@@ -1,5 +1,3 @@
-//! Text frames: one line per reading.
-
 use super::json;
 use super::names::{Filling, Names, Role};
 use super::printed::{self, Item};
@@ -269,7 +267,7 @@ fn role_of(names: &Names, known: &mut Vec<(Vec<u8>, Role)>, i: usize, name: &[u8
     role
 }
 
-/// A label such as `Reading` or `HX711 reading`.
+/// Label such as `Reading` or `HX711 reading`.
 fn is_general_label(label: &str) -> bool {
     const LABELS: [&str; 13] = [
         "adc",

@@ -1,5 +1,3 @@
-//! Head of a recording.
-
 use super::RecordingError;
 use crate::frame::Channel;
 use crate::session::Estimation;

@@ -1,5 +1,3 @@
-//! Reader of the blocks of an MCAP file.
-
 use super::head::{Head, LOCATOR, METADATA};
 use super::unpack::{self, BlockFault, MOST};
 use super::whole_record::parse;
@@ -15,7 +13,7 @@ use std::path::Path;
 
 const MOST_LOOSE: u64 = 1 << 20;
 
-/// A complete or cut-off MCAP file of palpate.
+/// Complete or cut-off MCAP file of palpate.
 #[derive(Debug)]
 pub struct McapFile {
     file: BufReader<File>,
@@ -31,7 +29,6 @@ pub struct McapFile {
     channels: BTreeMap<u16, Option<usize>>,
 }
 
-/// Block of messages.
 #[derive(Clone, Copy, Debug)]
 pub struct Block {
     kind: BlockKind,
@@ -82,7 +79,6 @@ impl RecordPlace {
 }
 
 impl McapFile {
-    /// Reads head and blocks of a file.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let shown = path.display().to_string();
         let (file, length) = open_regular(path).map_err(|error| cannot("open", &shown, error))?;

@@ -56,7 +56,7 @@ pub enum RecordingError {
         /// File.
         path: String,
     },
-    /// An invalid name.
+    /// Invalid name.
     #[error(
         "`{name}` is not a name of a recording: use at most 100 letters, digits, dots, dashes and underscores, and do not start with a dot"
     )]
@@ -64,7 +64,7 @@ pub enum RecordingError {
         /// Name.
         name: String,
     },
-    /// A link, a pipe, a device or a folder.
+    /// Link, pipe, device or folder.
     #[error("{path} is not a regular file")]
     NotRegular {
         /// File.

@@ -1,5 +1,3 @@
-//! Readers of recordings.
-
 use super::head::RecordedChannel;
 use super::mcap_file::{Block, McapFile, RawMessage};
 use super::{BlockFault, EXTENSION, Head, RecordingError};
@@ -10,15 +8,15 @@ use std::path::Path;
 /// Summary of a recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RecordingSummary {
-    /// Name of the file.
+    /// File name.
     pub name: String,
-    /// Size of the file.
+    /// File size.
     pub bytes: u64,
-    /// Start in seconds since 1970-01-01 00:00 UTC.
+    /// Unix time of the start in seconds.
     pub start_s: Option<f64>,
     /// Duration in seconds.
     pub seconds: f64,
-    /// Number of readings.
+    /// Readings.
     pub readings: u64,
     /// True for an active or cut-off recording.
     pub is_cut_off: bool,
@@ -29,7 +27,7 @@ pub struct RecordingSummary {
 pub struct Excerpt {
     /// Channels of a reading.
     pub channels: Vec<RecordedChannel>,
-    /// Start of the recording in seconds since 1970-01-01 00:00 UTC.
+    /// Unix time of the recording's start in seconds.
     pub start_s: Option<f64>,
     /// Duration of the recording in seconds.
     pub seconds: f64,
@@ -206,29 +204,29 @@ impl StoredReading {
 /// Message of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Recorded {
-    /// A reading.
+    /// Reading.
     Reading {
         /// Number, from 0.
         number: u64,
-        /// Time in ns since 1970.
+        /// Unix time in ns.
         unix_ns: u64,
         /// Values in the units of the head.
         values: Vec<f64>,
     },
-    /// An estimate.
+    /// Estimate.
     Estimate {
         /// Number of the reading.
         number: u64,
-        /// Time in ns since 1970.
+        /// Unix time in ns.
         unix_ns: u64,
         /// Located reading in SI units or raw.
         located: Vec<f64>,
         /// Record.
         estimate: Map<String, Value>,
     },
-    /// An event.
+    /// Event.
     Event {
-        /// Time in ns since 1970.
+        /// Unix time in ns.
         unix_ns: u64,
         /// Record.
         event: Map<String, Value>,
@@ -303,7 +301,7 @@ impl Playback {
         self.file.locator()
     }
 
-    /// Returns whether the file has a complete end.
+    /// True if the file has a complete end.
     pub fn is_whole(&self) -> bool {
         self.file.is_whole
     }

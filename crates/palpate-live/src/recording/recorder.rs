@@ -1,5 +1,3 @@
-//! Thread that records a session.
-
 use super::RecordingError;
 use super::head::{Head, LOCATOR, METADATA, Subject};
 use super::tail::Tail;
@@ -29,9 +27,9 @@ const LOOK_EVERY: Duration = Duration::from_secs(1);
 /// Status of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RecordingStatus {
-    /// Name of the file.
+    /// File name.
     pub name: String,
-    /// Size of the file.
+    /// File size.
     pub bytes: u64,
     /// Duration in seconds.
     pub seconds: f64,

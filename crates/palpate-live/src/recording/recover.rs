@@ -1,5 +1,3 @@
-//! Recovery of damaged recordings.
-
 use super::recorder::{describe, options};
 use super::{Playback, RecordingError, SkippedData};
 use mcap::McapError;
@@ -24,7 +22,7 @@ pub struct Recovery {
     pub skipped: SkippedData,
 }
 
-/// Copies the readable messages of a recording into a new file.
+/// Copies readable messages into a new file.
 ///
 /// # Errors
 /// Not a recording, or a failed write.

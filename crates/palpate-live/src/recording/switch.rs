@@ -1,5 +1,3 @@
-//! Recording on demand.
-
 use super::head::Subject;
 use super::recorder::{Recorder, RecordingStatus};
 use super::{EXTENSION, Head, RecordingError};
@@ -20,7 +18,7 @@ pub struct RecordingSwitch {
 }
 
 impl RecordingSwitch {
-    /// Creates a switch; `reports` receives problems.
+    /// Switch; `reports` receives problems.
     ///
     /// # Errors
     /// [`RecordingError::Encode`].
@@ -57,7 +55,7 @@ impl RecordingSwitch {
     /// Begins a recording with a unique name in a folder, which is created.
     ///
     /// # Errors
-    /// An invalid name, and as for [`Self::begin`].
+    /// An invalid name, and those of [`Self::begin`].
     pub fn begin_in(
         &self,
         folder: &Path,
@@ -120,7 +118,7 @@ pub fn check_name(name: &str) -> Result<&str, RecordingError> {
     if is_name { Ok(name) } else { Err(RecordingError::Name { name: name.to_owned() }) }
 }
 
-/// A time such as `2026-11-24T20-14-24Z`.
+/// Time such as `2026-11-24T20-14-24Z`.
 fn utc(unix_s: u64) -> String {
     let (days, second) = (unix_s / 86_400, unix_s % 86_400);
     // Civil date of a day since 1970-01-01, in eras of 400 years that begin in March.

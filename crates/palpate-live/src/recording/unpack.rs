@@ -1,5 +1,3 @@
-//! Messages of a block of an MCAP file.
-
 use super::whole_record::parse;
 use mcap::McapError;
 use mcap::records::{Record, op};
@@ -26,7 +24,6 @@ pub enum BlockFault {
     Damaged,
 }
 
-/// Passes on the records of a valid chunk.
 pub fn unpack_chunk(body: &[u8], mut hand_on: impl FnMut(Record)) -> Result<(), BlockFault> {
     let Some(Record::Chunk { header, data }) = parse(op::CHUNK, body) else {
         return Err(BlockFault::Damaged);

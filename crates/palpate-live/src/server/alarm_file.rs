@@ -1,5 +1,3 @@
-//! File of alarms.
-
 use palpate_files as whole_file;
 use std::io::{ErrorKind, Result};
 use std::path::{Path, PathBuf};
@@ -9,12 +7,12 @@ use std::path::{Path, PathBuf};
 pub struct AlarmFile(PathBuf);
 
 impl AlarmFile {
-    /// Returns `strip.alarms.toml` for a locator or rig `strip.json`.
+    /// `strip.alarms.toml` for a locator or rig `strip.json`.
     pub fn for_path(path: &Path) -> Self {
         Self(path.with_extension("alarms.toml"))
     }
 
-    /// Returns `alarms.toml` in a folder.
+    /// `alarms.toml` in a folder.
     pub fn in_folder(folder: &Path) -> Self {
         Self(folder.join("alarms.toml"))
     }

@@ -1,5 +1,3 @@
-//! Bodies of requests and answers.
-
 use super::connections::Connection;
 use axum::body::Bytes;
 use axum::extract::rejection::BytesRejection;
@@ -9,7 +7,6 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// Error answer: problem and remedy.
 #[derive(Debug)]
 pub struct ErrorAnswer {
     status: StatusCode,
@@ -23,7 +20,6 @@ impl ErrorAnswer {
         Self { status, error: error.into(), help, field: None }
     }
 
-    /// Sets the form field to be corrected.
     pub fn with_field(self, field: Option<&'static str>) -> Self {
         Self { field, ..self }
     }
@@ -39,7 +35,6 @@ impl IntoResponse for ErrorAnswer {
     }
 }
 
-/// JSON answer.
 pub struct JsonAnswer<T>(pub T);
 
 impl<T: Serialize> IntoResponse for JsonAnswer<T> {
@@ -71,7 +66,6 @@ fn unreadable_body(error: &BytesRejection) -> ErrorAnswer {
     ErrorAnswer::new(error.status(), error.body_text(), "send at most 64 kB of JSON")
 }
 
-/// Body with a JSON object.
 pub struct JsonBody<T>(pub T);
 
 impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {

@@ -46,7 +46,6 @@ pub enum BringUpError {
     Thread(#[from] std::io::Error),
 }
 
-/// Serial port.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PortRecord {
     /// Path, or name on Windows.
@@ -54,7 +53,6 @@ pub struct PortRecord {
     pub device: Option<String>,
 }
 
-/// JSON record of a board.
 #[derive(Clone, Debug, Serialize)]
 pub struct BringUpRecord {
     from: String,
@@ -67,7 +65,6 @@ pub struct BringUpRecord {
     monitor: MonitorRecord,
 }
 
-/// Board without a rig.
 pub struct BringUp {
     clock: HostClock,
     state: Mutex<State>,
@@ -86,7 +83,6 @@ struct WatchedSource {
 }
 
 impl BringUp {
-    /// Opens the source.
     pub fn begin(from: SourceUrl, folder: &Path, clock: HostClock) -> Result<Self, BringUpError> {
         let watched = Some(WatchedSource::open(&from, folder, clock)?);
         Ok(Self { clock, state: Mutex::new(State { from, watched }) })
@@ -112,9 +108,6 @@ impl BringUp {
     }
 
     /// Opens another port or rate.
-    ///
-    /// # Errors
-    /// [`BringUpError`] for other sources, or an unusable port or rate.
     pub fn choose(&self, port: Option<&str>, baud: Option<u32>, folder: &Path) -> Result<(), BringUpError> {
         let mut state = locked(&self.state);
         let SourceUrl::Serial { port: old_port, baud: old_baud, columns } = state.from.clone() else {

@@ -1,5 +1,3 @@
-//! Calibration guided by a browser.
-
 use super::lock::locked;
 use super::machine::{Attendance, MachineRecord, MachineState};
 use super::machine_run::{MachineRun, listen};
@@ -150,7 +148,6 @@ enum Phase {
     SettingUp,
 }
 
-/// JSON record of a calibration.
 #[derive(Clone, Debug, Serialize)]
 pub struct CalibrationRecord {
     phase: Phase,
@@ -251,7 +248,7 @@ struct Running {
 }
 
 impl Calibrator {
-    /// Creates a calibration; paths of sources are relative to `folder`.
+    /// Calibration; paths of sources are relative to `folder`.
     pub fn new(mut plan: CalibrationPlan, folder: PathBuf, clock: HostClock) -> Self {
         let rows = std::mem::take(&mut plan.before);
         let state = State {
@@ -288,9 +285,6 @@ impl Calibrator {
 
     /// Begins or continues the calibration, after connection to a machine. `free_source` ends the session at
     /// the source.
-    ///
-    /// # Errors
-    /// [`CalibratorError`] during another step, or of statements, source or recording.
     pub fn begin(&self, stated: Statements, free_source: impl FnOnce()) -> Result<(), CalibratorError> {
         stated.check()?;
         let mut state = self.lock();
@@ -318,9 +312,6 @@ impl Calibrator {
     }
 
     /// Begins the set-up, or a dry run.
-    ///
-    /// # Errors
-    /// [`CalibratorError`] without a machine, during another step, or of the source.
     pub fn begin_set_up(&self, is_dry_run: bool, free_source: impl FnOnce()) -> Result<(), CalibratorError> {
         let mut state = self.lock();
         if self.plan.machine().is_none() {
@@ -349,10 +340,6 @@ impl Calibrator {
         is_free && self.plan.machine().is_some()
     }
 
-    /// Queues a set-up task.
-    ///
-    /// # Errors
-    /// [`CalibratorError::NotSetUp`] or `Jog`.
     pub fn ask_set_up(&self, task: SetUpTask) -> Result<(), CalibratorError> {
         if let SetUpTask::Jog(by_m) = &task {
             let is_short = by_m.iter().all(|by_m| by_m.abs() <= LONGEST_JOG_M);
@@ -405,9 +392,6 @@ impl Calibrator {
     }
 
     /// Begins presses at fresh places, which check the locator on disk.
-    ///
-    /// # Errors
-    /// [`CalibratorError`] without a locator, or of the source.
     pub fn begin_check(&self, free_source: impl FnOnce()) -> Result<(), CalibratorError> {
         let mut state = self.lock();
         if !self.can_check(&state) {
@@ -506,9 +490,6 @@ impl Calibrator {
     }
 
     /// Stops the machine at once.
-    ///
-    /// # Errors
-    /// [`CalibratorError::NoMachine`].
     pub fn halt(&self) -> Result<(), CalibratorError> {
         if self.plan.machine.is_none() {
             return Err(CalibratorError::NoMachine);
@@ -524,9 +505,6 @@ impl Calibrator {
     }
 
     /// Requests the last press again.
-    ///
-    /// # Errors
-    /// [`CalibratorError`] without a press.
     pub fn redo(&self) -> Result<(), CalibratorError> {
         self.with_hand(|calibration| match calibration.redo()? {
             true => Ok(()),
@@ -534,10 +512,6 @@ impl Calibrator {
         })
     }
 
-    /// Learns the baseline again.
-    ///
-    /// # Errors
-    /// [`CalibratorError::NotBegun`] or `MachinePresses`.
     pub fn relearn_untouched(&self) -> Result<(), CalibratorError> {
         self.with_hand(|calibration| {
             calibration.relearn_untouched();
@@ -545,10 +519,6 @@ impl Calibrator {
         })
     }
 
-    /// Skips the next press.
-    ///
-    /// # Errors
-    /// [`CalibratorError::NotBegun`] or `MachinePresses`.
     pub fn skip(&self) -> Result<(), CalibratorError> {
         self.with_hand(|calibration| {
             calibration.skip();
@@ -557,9 +527,6 @@ impl Calibrator {
     }
 
     /// Ends the presses or the set-up early.
-    ///
-    /// # Errors
-    /// [`CalibratorError::NotBegun`].
     pub fn stop(&self) -> Result<(), CalibratorError> {
         if self.ask_set_up(SetUpTask::End).is_ok() {
             return Ok(());
@@ -571,9 +538,6 @@ impl Calibrator {
     }
 
     /// Deletes a press, counted from 1, and requests it again.
-    ///
-    /// # Errors
-    /// [`CalibratorError`] without the press, with a machine, during another step, or of the file.
     pub fn strike(&self, press: usize) -> Result<(), CalibratorError> {
         let mut state = self.lock();
         if state.machine_presses() {
@@ -611,7 +575,6 @@ impl Calibrator {
         Ok(())
     }
 
-    /// Recorded presses.
     pub fn presses(&self) -> Vec<PressRecord> {
         let state = self.lock();
         let extent = self.plan.rig.setup.surface().extent();
@@ -647,9 +610,6 @@ impl Calibrator {
     }
 
     /// Ends the presses.
-    ///
-    /// # Errors
-    /// [`CalibratorError::NoPress`] or `GoesOn`.
     pub fn begin_fit(&self) -> Result<(), CalibratorError> {
         let mut state = self.lock();
         if matches!(state.phase(), Phase::Fitting | Phase::Assessing | Phase::Checking | Phase::SettingUp) {

@@ -18,7 +18,7 @@ use std::time::Duration;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::task::AbortHandle;
 
-/// Time for the head of a request, or for idling. One or two packets arrive within a second, even with a
+/// Time for the head of a request, or for idling: one or two packets arrive within a second, even with a
 /// retransmission.
 const HEAD_WITHIN: Duration = Duration::from_secs(10);
 /// Time for a body: 64 kB take a second at 0.5 Mbit/s.
@@ -45,7 +45,6 @@ fn most_files() -> usize {
     usize::MAX
 }
 
-/// Limits on connections.
 #[derive(Clone, Copy, Debug)]
 pub struct ConnectionLimits {
     head_within: Duration,
@@ -67,13 +66,11 @@ pub struct Connection {
 }
 
 impl Connection {
-    /// Notes a complete request.
     pub fn note_whole_request(&self) {
         self.has_asked.store(true, Ordering::Relaxed);
     }
 }
 
-/// Serves connections forever.
 pub async fn serve(listener: TcpListener, router: Router, bounds: ConnectionLimits) -> Infallible {
     let mut open = Open::default();
     loop {

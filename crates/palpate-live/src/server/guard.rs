@@ -33,7 +33,7 @@ pub enum AccessError {
     /// A reachable address needs a token.
     #[error("{address} can be reached from other machines, but no token is set")]
     NoToken {
-        /// The address.
+        /// Address.
         address: IpAddr,
     },
     /// Invalid token.
@@ -55,7 +55,7 @@ pub struct Access {
 }
 
 impl Access {
-    /// Creates the permissions at an address. `host_names` are further names of this machine.
+    /// Permissions at an address. `host_names` are further names of this machine.
     ///
     /// # Errors
     /// [`AccessError`] for an invalid token, or a reachable address without one.
@@ -163,7 +163,6 @@ fn equal(given: &[u8], token: &[u8]) -> bool {
     given.len() == token.len() && std::hint::black_box(differ) == 0
 }
 
-/// Guard of all routes.
 #[derive(Debug)]
 pub struct Guard {
     access: Access,

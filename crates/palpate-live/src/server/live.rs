@@ -1,5 +1,3 @@
-//! Live use of a locator.
-
 use super::alarm_file::AlarmFile;
 use super::bring_up::{BringUp, BringUpError, BringUpRecord};
 use super::calibration::{CalibrationPlan, CalibrationRecord, Calibrator, CalibratorError};
@@ -223,8 +221,7 @@ impl Live {
     /// Replaces the alarms, also on disk; empty text removes them.
     ///
     /// # Errors
-    /// [`LiveError::NoLocator`], `AlarmFile`, or `Rule` for invalid text, another action, or a rule without
-    /// effect.
+    /// [`LiveError::NoLocator`], `AlarmFile`, or `Rule` for invalid text, another action, or no effect.
     pub(super) fn set_alarms(&self, text: &str) -> Result<(), LiveError> {
         let subject = self.subject();
         let locator = subject.locator.as_ref().ok_or(LiveError::NoLocator)?;
@@ -253,7 +250,7 @@ impl Live {
     /// Replaces the session.
     ///
     /// # Errors
-    /// [`LiveError`] of source, sinks, columns or configuration; the running session then continues.
+    /// [`LiveError`] of source, sinks, columns or configuration; the running session continues.
     pub fn begin(&self, url: &SourceUrl) -> Result<(), LiveError> {
         pipeline::check_pace(&self.config.estimation, url)?;
         self.begin_with(url.to_string(), url.columns(), |clock, to| {
@@ -411,9 +408,6 @@ impl Live {
     }
 
     /// Makes a rig; a written one can be calibrated.
-    ///
-    /// # Errors
-    /// [`LiveError::BringUp`] or `RigForm`.
     pub(super) fn make_rig(&self, form: &RigForm) -> Result<NewRigRecord, LiveError> {
         let board = self.board()?;
         let mut made = NewRig::new(form, &board.from(), &board.channels(), &self.folder)?;
@@ -484,9 +478,6 @@ impl Live {
     }
 
     /// Fits the presses in a thread, then begins a session.
-    ///
-    /// # Errors
-    /// [`LiveError`] without presses, or during a fit.
     pub(super) fn finish_calibration(self: &Arc<Self>) -> Result<(), LiveError> {
         let calibrator = self.calibrator()?;
         calibrator.begin_fit()?;
@@ -522,7 +513,7 @@ impl Live {
         running.as_ref().filter(|running| !running.thread.is_finished()).map(|running| running.url.clone())
     }
 
-    /// Channels of a reading.
+    /// Channels.
     pub fn channels(&self) -> Vec<Channel> {
         self.subject().channels.clone()
     }

@@ -1,5 +1,3 @@
-//! Locks that survive a panic.
-
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Locks a mutex, even after a panic.

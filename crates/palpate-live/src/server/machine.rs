@@ -35,7 +35,6 @@ impl Attendance {
         self.is_needed.load(Ordering::Relaxed)
     }
 
-    /// Sets the need for attendance.
     pub fn set_needed(&self, is_needed: bool) {
         self.is_needed.store(is_needed, Ordering::Relaxed);
     }
@@ -81,7 +80,6 @@ impl MachineState {
     }
 }
 
-/// JSON record of a machine.
 #[derive(Clone, Debug, Serialize)]
 pub struct MachineRecord {
     url: String,
@@ -154,7 +152,6 @@ impl MachineRecord {
         }
     }
 
-    /// Machine in use, with `left` presses.
     pub fn running(
         self,
         state: &MachineState,

@@ -32,14 +32,12 @@ pub fn listen(inputs: &Receiver<Input>, shared: &Mutex<Shared>) {
     }
 }
 
-/// Run of a machine.
 #[derive(Clone, Debug)]
 pub struct MachineRun {
     pub url: StageUrl,
     pub stage: Stage,
     /// First set-up tasks; `None` for presses.
     pub set_up: Option<Vec<SetUpTask>>,
-    /// Flag that stops the machine.
     pub stop: Arc<AtomicBool>,
     pub attendance: Arc<Attendance>,
     pub clock: HostClock,

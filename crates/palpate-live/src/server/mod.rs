@@ -40,15 +40,15 @@ use tokio::sync::oneshot;
 /// Error of the start of a server.
 #[derive(Debug, thiserror::Error)]
 pub enum ServerError {
-    /// Failure to listen at the address.
+    /// Failure to listen.
     #[error("cannot listen at {address}: {error}")]
     Listen {
-        /// The address.
+        /// Address.
         address: SocketAddr,
         /// Cause.
         error: std::io::Error,
     },
-    /// Failure of the thread or the event queue.
+    /// Failed thread or event queue.
     #[error("cannot run a web server: {0}")]
     Run(#[from] std::io::Error),
 }

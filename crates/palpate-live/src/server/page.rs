@@ -1,5 +1,3 @@
-//! Files of the dashboard, if built.
-
 use axum::http::{Method, StatusCode, Uri, header};
 use axum::response::{Html, IntoResponse, Response};
 use rust_embed::RustEmbed;

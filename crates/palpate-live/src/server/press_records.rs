@@ -1,12 +1,9 @@
-//! JSON records of presses and checks.
-
 use crate::calibration::{Check, Trace, deviation_percent};
 use palpate_estimators::recording::Row;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use serde::Serialize;
 
-/// JSON record of a press.
 #[derive(Clone, Debug, Serialize)]
 pub struct PressRecord {
     /// Number, from 1.
@@ -45,7 +42,6 @@ pub fn press_records(
     touched.enumerate().map(record).collect()
 }
 
-/// JSON record of a check.
 #[derive(Clone, Debug, Serialize)]
 pub struct CheckRecord {
     presses: String,

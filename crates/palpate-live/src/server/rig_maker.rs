@@ -13,7 +13,6 @@ const LONGEST_NAME: usize = 100;
 
 const MOST_COUNT: usize = 100_000;
 
-/// Form of a rig.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RigForm {
@@ -26,9 +25,7 @@ pub struct RigForm {
     pub width_mm: Option<f64>,
     /// Number of places along each direction.
     pub places: Vec<usize>,
-    /// Presses of each place.
     pub repeats: usize,
-    /// Force, if known.
     #[serde(default)]
     pub force_n: Option<f64>,
     /// Second force, for every other place.
@@ -37,7 +34,6 @@ pub struct RigForm {
     /// Standard deviation of the placement.
     #[serde(default)]
     pub placement_mm: Option<f64>,
-    /// Place of each sensor.
     #[serde(default)]
     pub sensor_places_mm: Option<Vec<Vec<f64>>>,
     /// True if contacts in use have this force.
@@ -62,7 +58,7 @@ pub enum RigFormError {
     /// Invalid file name.
     #[error("`{name}` cannot name a rig: use letters, digits, `-`, `_`, and `.toml` at the end")]
     Name {
-        /// The name.
+        /// Name.
         name: String,
     },
     /// Wrong number of channels.
@@ -141,7 +137,6 @@ impl RigFormError {
     }
 }
 
-/// Rig with its files.
 #[derive(Debug)]
 pub struct NewRig {
     pub rig: Rig,
@@ -153,24 +148,17 @@ pub struct NewRig {
     pub statements: Statements,
 }
 
-/// JSON record of a rig.
 #[derive(Clone, Debug, Serialize)]
 pub struct NewRigRecord {
     pub file: String,
     pub text: String,
     /// Command for a later calibration.
     pub command: String,
-    /// True if the rig is on disk.
     pub written: bool,
-    /// Existing files.
     pub exists: Vec<String>,
 }
 
 impl NewRig {
-    /// Creates the rig for a board with these channels.
-    ///
-    /// # Errors
-    /// [`RigFormError`] of the form.
     pub fn new(
         form: &RigForm,
         from: &SourceUrl,

@@ -1,5 +1,3 @@
-//! Routes of the server.
-
 use super::body::{ErrorAnswer, JsonAnswer, JsonBody};
 use super::bring_up::{BringUpError, BringUpRecord};
 use super::calibration::{CalibrationRecord, CalibratorError};

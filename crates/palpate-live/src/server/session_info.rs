@@ -1,5 +1,3 @@
-//! Description of a session.
-
 use super::calibration::Calibrator;
 use crate::frame::Channel;
 use crate::recording::RecordingStatus;
@@ -18,7 +16,6 @@ const LIMIT_S: f64 = 5.0;
 /// Force of the accuracy limit, if unknown.
 const FORCE_N: f64 = 1.0;
 
-/// JSON record of a session.
 #[derive(Clone, Debug, Serialize)]
 pub struct SessionInfo {
     version: &'static str,

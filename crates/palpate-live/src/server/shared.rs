@@ -1,5 +1,3 @@
-//! Shared state of a calibration.
-
 use super::machine::MachineState;
 use crate::calibration::{Calibration, CalibrationError, Note, SetUpNote, SetUpTask, last_deviation_percent};
 use crate::feed::REPEATED_READINGS;
@@ -7,7 +5,6 @@ use crate::input::TimedArrival;
 use crate::stamp::HostClock;
 use std::collections::VecDeque;
 
-/// State of a calibration.
 pub struct Shared {
     pub calibration: Calibration,
     pub clock: HostClock,
@@ -17,7 +14,6 @@ pub struct Shared {
     /// Reason for a repeated request, or awaited condition.
     pub hint: Option<String>,
     pub machine: MachineState,
-    /// Pending set-up tasks.
     pub tasks: VecDeque<SetUpTask>,
 }
 

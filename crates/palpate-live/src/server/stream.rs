@@ -1,5 +1,3 @@
-//! Stream of a session to a browser.
-
 use super::body::ErrorAnswer;
 use super::connections::most_open;
 use super::live::Live;
@@ -22,7 +20,6 @@ const MOST_WAITING: usize = 1 << 20;
 /// Time before a browser that does not read is disconnected.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Query of a stream.
 #[derive(Debug, Deserialize)]
 pub struct StreamQuery {
     #[serde(default)]
@@ -48,7 +45,6 @@ enum Rate {
     All,
 }
 
-/// Opens a stream.
 pub async fn stream(
     State(live): State<Arc<Live>>,
     wish: Result<Query<StreamQuery>, QueryRejection>,

@@ -74,7 +74,7 @@ struct SnapshotRecord<'a> {
 }
 
 impl WebSink {
-    /// Creates a sink for these channels.
+    /// Sink for these channels.
     pub fn new(hub: Hub, channels: &[Channel], extent: Extent) -> Self {
         Self { hub, channels: channels.to_vec(), extent, recent: Vec::new() }
     }
@@ -146,7 +146,6 @@ fn thinned<'a>(samples: &[&'a Sample]) -> Vec<&'a Sample> {
     thinned
 }
 
-/// Adds the number of missed messages.
 pub fn with_missed(message: &Utf8Bytes, missed: u64) -> Utf8Bytes {
     match message.strip_suffix(NONE_MISSED) {
         Some(rest) if missed > 0 => format!("{rest}\"missed\":{missed}}}").into(),

@@ -1,5 +1,3 @@
-//! Detector of contact events.
-
 use super::touches;
 use crate::event::Event;
 use palpate_core::{ContactEstimate, Estimate, Position, Status};

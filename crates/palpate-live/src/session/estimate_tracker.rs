@@ -1,5 +1,3 @@
-//! Tracked estimates.
-
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_estimators::estimator::{
     Locator, NotTrackable, Track, TrackedContact, Tracker, TrackerConfig, Tracking,
@@ -19,7 +17,7 @@ pub struct EstimateTracker {
 }
 
 impl EstimateTracker {
-    /// Creates a tracker.
+    /// Tracker.
     ///
     /// # Errors
     /// [`NotTrackable`].
@@ -35,8 +33,7 @@ impl EstimateTracker {
         })
     }
 
-    /// Returns the estimate after a reading at `unix_ns` since 1970; `single` for a time that does not
-    /// increase.
+    /// Estimate after a reading at `unix_ns`; `single` for a time that does not increase.
     ///
     /// A state that is not finite, as after a reading of 1e300, restarts the tracker with `single`.
     pub fn update(&mut self, unix_ns: u64, reading: &[f64], tared: &[f64], single: Estimate) -> Estimate {

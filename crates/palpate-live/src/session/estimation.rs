@@ -1,5 +1,3 @@
-//! Estimation methods of a session.
-
 use super::estimate_tracker::EstimateTracker;
 use super::low_pass::LowPass;
 use palpate_core::Estimate;
@@ -54,7 +52,7 @@ pub enum SessionError {
 }
 
 impl Estimation {
-    /// Returns the tracker of the method, if any.
+    /// Tracker of the method, if any.
     ///
     /// # Errors
     /// [`SessionError`].

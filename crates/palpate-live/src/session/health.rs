@@ -1,5 +1,3 @@
-//! Health of channels.
-
 use crate::event::{ChannelState, Event};
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use serde::Serialize;

@@ -1,5 +1,3 @@
-//! Low-pass filter for irregular times.
-
 use palpate_numerics::OutOfRange;
 use std::f64::consts::TAU;
 
@@ -17,10 +15,7 @@ pub struct LowPass {
 }
 
 impl LowPass {
-    /// Creates a filter with a cut-off frequency of 1e-6 to 1e9 Hz.
-    ///
-    /// # Errors
-    /// [`OutOfRange`].
+    /// Cut-off frequency of 1e-6 to 1e9 Hz.
     pub fn new(cutoff_hz: f64) -> Result<Self, OutOfRange> {
         let number = [("the cut-off frequency", cutoff_hz)];
         OutOfRange::check(RANGE_IN_WORDS, number, |cutoff_hz| RANGE_HZ.contains(&cutoff_hz))?;

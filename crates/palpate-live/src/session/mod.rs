@@ -51,9 +51,9 @@ pub enum TareMode {
 /// Output of a session.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Output {
-    /// A reading with its estimate.
+    /// Reading with its estimate.
     Sample(Box<Sample>),
-    /// An event.
+    /// Event.
     Event(EventRecord),
 }
 
@@ -70,7 +70,7 @@ pub struct Counters {
     pub gaps: u64,
 }
 
-/// A session of a locator.
+/// Session of a locator.
 pub struct Session<'a> {
     locator: &'a Locator,
     channels: Vec<Channel>,
@@ -89,7 +89,7 @@ pub struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    /// Creates a session.
+    /// Session.
     ///
     /// # Errors
     /// [`SessionError`].
@@ -114,8 +114,8 @@ impl<'a> Session<'a> {
         })
     }
 
-    /// Sets the columns of frames without names: channels, time (`t`, `ms`, `us`), sequence number (`n`);
-    /// others are ignored.
+    /// Names the values of unnamed frames: channels, time (`t`, `ms`, `us`), sequence number (`n`); others are
+    /// ignored.
     ///
     /// # Errors
     /// [`ColumnsError`].
@@ -123,7 +123,7 @@ impl<'a> Session<'a> {
         self.frames.set_columns(columns)
     }
 
-    /// Channels of the frames.
+    /// Channels.
     pub fn channels(&self) -> &[Channel] {
         &self.channels
     }
@@ -260,7 +260,7 @@ impl<'a> Session<'a> {
         out.push(Output::Event(EventRecord { time_s, event }));
     }
 
-    /// Returns whether the surface is touched.
+    /// True if the surface is touched.
     pub fn is_touched(&self) -> bool {
         self.contact.is_touched()
     }

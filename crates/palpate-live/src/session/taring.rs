@@ -1,5 +1,3 @@
-//! Baseline of a session.
-
 use super::{Estimation, TareMode};
 use palpate_core::Estimate;
 use palpate_core::Tare;
@@ -48,7 +46,7 @@ impl Taring {
         self.pending = self.tare.as_ref().map(begun);
     }
 
-    /// Returns the estimate, and whether a baseline was completed.
+    /// Estimate, and whether a baseline was completed.
     pub fn locate(
         &mut self,
         locator: &Locator,

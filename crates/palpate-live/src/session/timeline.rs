@@ -1,5 +1,3 @@
-//! Times of readings, and gaps.
-
 use crate::device_clock::{self, DeviceClock};
 use crate::frame::Frame;
 use crate::stamp::Stamp;
@@ -21,7 +19,7 @@ pub struct Timeline {
     rate_hz: f64,
 }
 
-/// A time without readings.
+/// Time without readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gap {
     pub seconds: f64,
@@ -78,7 +76,7 @@ impl Timeline {
         }
     }
 
-    /// Returns the increasing time in ns since 1970, and a preceding gap; `behind` more frames arrived.
+    /// Increasing Unix time in ns, and a preceding gap; `behind` more frames arrived.
     pub fn next(&mut self, at: Stamp, frame: &Frame, behind: usize) -> (u64, Option<Gap>) {
         let gap = self.gap(at.elapsed, frame.sequence);
         if gap.is_some_and(|gap| gap.kind == GapKind::Silence) {

@@ -1,5 +1,3 @@
-//! Faults of a simulated board.
-
 use palpate_estimators::imperfections::Imperfections;
 use palpate_estimators::setup::Setup;
 use rand::{RngExt, SeedableRng};
@@ -20,7 +18,7 @@ pub struct FaultConfig {
 }
 
 impl FaultConfig {
-    /// Returns the imperfections of a setup, without faults of transmission.
+    /// Imperfections of a setup, without faults of transmission.
     pub fn of_setup(setup: &Setup) -> Self {
         let imperfections = setup.imperfections().copied().unwrap_or_default();
         Self { imperfections, ..Self::default() }

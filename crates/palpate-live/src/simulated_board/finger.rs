@@ -1,5 +1,3 @@
-//! Finger on a simulated board.
-
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 use palpate_rig::Rig;
@@ -53,7 +51,7 @@ impl Finger {
     /// Untouched share of a side.
     const MARGIN: f64 = 0.05;
 
-    /// Creates a finger with random touches, of the rig's force or around that of its calibration rows.
+    /// Finger with random touches, of the rig's force or that of its calibration rows.
     pub fn random(rig: &Rig, seed: u64) -> Self {
         let typical_n = rig.training.as_ref().and_then(|training| training.force_n).unwrap_or(1.0);
         let nowhere = Position::default();
@@ -72,7 +70,7 @@ impl Finger {
         finger
     }
 
-    /// Returns the contact at a time in seconds, which must not decrease.
+    /// Contact at a time in seconds, which must not decrease.
     pub fn contact_at(&mut self, time_s: f64) -> Option<Contact> {
         if let Some(held) = self.set_by_stage {
             return held;
@@ -126,7 +124,7 @@ impl Finger {
         Ok(self)
     }
 
-    /// Returns whether a line is a command to a finger.
+    /// True for a command to a finger.
     pub fn is_command(line: &str) -> bool {
         matches!(line.split_whitespace().next(), Some("finger" | "lift" | "reset"))
     }

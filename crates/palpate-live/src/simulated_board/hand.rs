@@ -58,7 +58,7 @@ const TAP_S: f64 = 0.12;
 /// Time from the onset.
 const EARLY_LIFT_S: f64 = 0.15;
 
-/// A hand in the course of a calibration.
+/// Hand in the course of a calibration.
 #[derive(Clone, Debug)]
 pub struct SimulatedHand {
     style: HandStyle,
@@ -79,7 +79,7 @@ struct Leg {
 }
 
 impl SimulatedHand {
-    /// Returns a lifted hand.
+    /// Lifted hand.
     pub fn new(style: HandStyle, extent: Extent, seed: u64) -> Self {
         Self {
             style,
@@ -93,7 +93,7 @@ impl SimulatedHand {
         }
     }
 
-    /// Returns the contact at a time in seconds, which must not decrease.
+    /// Contact at a time in seconds, which must not decrease.
     pub fn contact_at(&mut self, time_s: f64, instruction: Instruction) -> Option<Contact> {
         if self.is_over(time_s) {
             let share = self.share_at(time_s);

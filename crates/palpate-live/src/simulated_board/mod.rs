@@ -90,7 +90,7 @@ pub struct FrameCounts {
 }
 
 impl<'a> SimulatedBoard<'a> {
-    /// Creates a board on the bench of a setup.
+    /// Board on the bench of a setup.
     ///
     /// # Errors
     /// [`SimulateError`].
@@ -133,7 +133,7 @@ impl<'a> SimulatedBoard<'a> {
         Ok(self)
     }
 
-    /// Time of the next frame since the start.
+    /// Time of the next frame.
     pub fn next_at(&self) -> Duration {
         Duration::from_secs_f64(self.count as f64 / self.rate_hz)
     }
@@ -148,7 +148,7 @@ impl<'a> SimulatedBoard<'a> {
         &mut self.finger
     }
 
-    /// Returns the frames until `elapsed` since the start.
+    /// Frames until `elapsed` since the start.
     pub fn send_until(&mut self, elapsed: Duration) -> Vec<u8> {
         let mut bytes = Vec::new();
         while self.next_at() <= elapsed {

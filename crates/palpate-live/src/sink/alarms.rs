@@ -1,5 +1,3 @@
-//! Alarms by replaceable rules.
-
 use super::{Batch, Sink};
 use crate::event::Event;
 use crate::input::{Command, Input};
@@ -36,7 +34,7 @@ pub struct AlarmSink {
 }
 
 impl AlarmSink {
-    /// Creates a sink; `reports` receives alarms.
+    /// Sink; `reports` receives alarms.
     pub fn new(alarms: Alarms, reports: SyncSender<Input>) -> Self {
         Self { alarms, reports }
     }

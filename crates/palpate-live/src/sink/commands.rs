@@ -1,5 +1,3 @@
-//! Commands of rules to a board.
-
 use super::{Batch, Sink};
 use crate::commander::{Commander, SendError};
 use crate::input::{Command, Input};
@@ -31,7 +29,7 @@ enum CommandSinkError {
 }
 
 impl CommandSink {
-    /// Creates a sink; `reports` receives new causes of unsent commands.
+    /// Sink; `reports` receives new causes of unsent commands.
     pub fn new(rules: Rules, to: Commander, reports: SyncSender<Input>) -> Self {
         Self { rules: RuleWatch::new(rules), to, reports, stretch: (Instant::now(), 0), trouble: None }
     }

@@ -1,5 +1,3 @@
-//! Samples and events as lines of JSON.
-
 use super::{Batch, Sink};
 use crate::frame::Channel;
 use crate::input::{Command, Input};
@@ -21,7 +19,7 @@ pub struct JsonLines<W> {
 }
 
 impl<W: Write> JsonLines<W> {
-    /// Creates a sink; `reports` receives a write error.
+    /// Sink; `reports` receives a write error.
     pub fn new(out: W, channels: &[Channel], extent: Extent, reports: SyncSender<Input>) -> Self {
         Self { out, channels: channels.to_vec(), extent, reports, failed: Arc::default() }
     }

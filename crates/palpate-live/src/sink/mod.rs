@@ -51,7 +51,7 @@ impl Batch {
 /// State of a session, sent at 60 Hz.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct StateRecord {
-    /// Name of the connected source.
+    /// Connected source.
     pub source: Option<String>,
     /// Readings per second.
     pub rate_hz: f64,

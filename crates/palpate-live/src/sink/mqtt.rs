@@ -1,5 +1,3 @@
-//! MQTT messages of estimates and events.
-
 use super::{Batch, Sink};
 use crate::address::Address;
 use crate::broker::{broker_and_login, explain};
@@ -64,7 +62,7 @@ impl FromStr for MqttUrl {
     }
 }
 
-/// The URL without the login.
+/// URL without the login.
 impl fmt::Display for MqttUrl {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "mqtt://{}/{}", self.broker, self.topic)
@@ -100,7 +98,7 @@ pub struct MqttSink {
 }
 
 impl MqttSink {
-    /// Creates a client of a broker, which may be offline; `reports` receives problems.
+    /// Client of a broker, which may be offline; `reports` receives problems.
     ///
     /// # Errors
     /// The system provides no thread.
@@ -121,7 +119,7 @@ impl MqttSink {
         Ok(Self { to: Some(to), lost, thread: Some(thread) })
     }
 
-    /// Number of lost messages, counted until the end.
+    /// Lost messages, counted until the end.
     pub fn lost(&self) -> Arc<AtomicU64> {
         Arc::clone(&self.lost)
     }

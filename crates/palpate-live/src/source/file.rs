@@ -68,7 +68,7 @@ fn sleep_until(outlet: &InputSender, start: Instant, due: Duration) -> bool {
     }
 }
 
-/// Returns a line of numbers that parse back exactly.
+/// Line of numbers that parse back exactly.
 pub fn line(values: &[f64]) -> String {
     let mut line = String::new();
     for value in values {

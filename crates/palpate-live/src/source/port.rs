@@ -10,12 +10,12 @@ use std::time::Instant;
 pub const CHUNK: usize = 1 << 16;
 const WRITE: std::time::Duration = std::time::Duration::from_millis(50);
 
-/// An open device.
+/// Open device.
 pub trait Port {
     /// Waits at most [`LOOK`].
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<Arrival>>;
 
-    /// Returns the bytes from before the opening, if known.
+    /// Bytes from before the opening, if known.
     fn backlog(&mut self) -> io::Result<Vec<u8>> {
         Ok(Vec::new())
     }
@@ -92,7 +92,7 @@ fn is_wait(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted)
 }
 
-/// A stream with timeouts of [`LOOK`].
+/// Stream with timeouts of [`LOOK`].
 pub struct Stream<T> {
     pub stream: T,
     /// Message at the end of the stream.

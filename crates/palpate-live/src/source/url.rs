@@ -1,5 +1,3 @@
-//! URLs of sources.
-
 use crate::address::Address;
 use crate::broker::broker_and_login;
 use crate::login::{Login, without_passwords};

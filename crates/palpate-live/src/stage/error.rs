@@ -1,5 +1,3 @@
-//! Errors of machines.
-
 use palpate_numerics::OutOfRange;
 use std::fmt;
 use std::io;
@@ -16,7 +14,7 @@ pub enum StageError {
         quoted(answer)
     )]
     Unknown {
-        /// Text of the answer.
+        /// Answer.
         answer: String,
     },
     /// Unexpected answer or position.
@@ -47,15 +45,15 @@ pub enum StopReason {
     /// Unexpected answer.
     #[error("the machine answered {} to `{command}`", quoted(answer))]
     Answer {
-        /// The command.
+        /// Command.
         command: String,
-        /// The line.
+        /// Line.
         answer: String,
     },
     /// `ok` without the requested report.
     #[error("the machine answered `{command}` without {expected}")]
     NoReport {
-        /// The command.
+        /// Command.
         command: String,
         /// Report.
         expected: &'static str,
@@ -69,7 +67,7 @@ pub enum StopReason {
     /// Missing answer.
     #[error("the machine did not answer `{command}` within {seconds} s")]
     Silent {
-        /// The command.
+        /// Command.
         command: String,
         /// Seconds of waiting.
         seconds: u64,

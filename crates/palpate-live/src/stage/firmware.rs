@@ -1,5 +1,3 @@
-//! Dialects of firmware.
-
 /// Firmware of a machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Firmware {

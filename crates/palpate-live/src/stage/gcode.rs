@@ -385,7 +385,6 @@ impl<L: StageLink> GcodeStage<L> {
         Ok(())
     }
 
-    /// Firmware from a greeting or queries, if known.
     fn identify(&mut self, said: &mut String) -> Result<Option<Firmware>, Fault> {
         let until = self.link.now() + IDENTIFY;
         // Queries of Marlin and GRBL.

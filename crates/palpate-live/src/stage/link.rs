@@ -1,5 +1,3 @@
-//! Link to a machine: bytes, clock and reset line.
-
 use super::url::StageUrl;
 use crate::stamp::HostClock;
 use std::io::{self, Read, Write};

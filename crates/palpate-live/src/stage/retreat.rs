@@ -87,7 +87,6 @@ impl<L: StageLink> GcodeStage<L> {
         self.set()
     }
 
-    /// Reads until silence, at most for `most`.
     fn skip_until_silence(&mut self, most: Duration) -> Result<(), Fault> {
         let until = self.link.now() + most;
         while self.next_line(self.link.now())?.is_some() && self.link.now() < until {}

@@ -168,12 +168,12 @@ pub struct SimulatedMachine {
 }
 
 impl SimulatedMachine {
-    /// Creates a machine; `force_n` acts at the greatest depth.
+    /// Machine; `force_n` acts at the greatest depth.
     pub fn new(firmware: Firmware, setup: Stage, extent: Extent, force_n: f64) -> Self {
         Self::with_config(firmware, setup, extent, force_n, MachineConfig::default())
     }
 
-    /// Creates a machine with a behaviour.
+    /// Machine with a behaviour.
     pub fn with_config(
         firmware: Firmware,
         setup: Stage,
@@ -264,17 +264,17 @@ impl SimulatedMachine {
         self.state().motion.is_some()
     }
 
-    /// Number of faults so far.
+    /// Faults so far.
     pub fn faults_met(&self) -> usize {
         self.state().faults_met
     }
 
-    /// Number of moves after a fault or before homing, without lifts.
+    /// Moves after a fault or before homing, without lifts.
     pub fn unsafe_moves(&self) -> usize {
         self.state().unsafe_moves
     }
 
-    /// Creates a link in virtual time.
+    /// Link in virtual time.
     pub fn link(&self) -> SimulatedLink {
         SimulatedLink { machine: self.clone(), is_waited_for: Duration::from_millis(10) }
     }
@@ -370,13 +370,11 @@ struct State {
     is_homed: bool,
     mode: Mode,
     stopped_at: Option<Duration>,
-    /// Number of lines of each fault.
     line_counts: Vec<u32>,
     faults_met: usize,
     unsafe_moves: usize,
 }
 
-/// Interval of `busy` messages.
 const BUSY_EVERY: Duration = Duration::from_secs(2);
 
 impl State {

@@ -1,5 +1,3 @@
-//! Thread of a machine.
-
 use super::error::StageError;
 use super::firmware::Firmware;
 use super::gcode::{GcodeStage, Stopping};

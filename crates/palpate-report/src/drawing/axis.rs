@@ -1,17 +1,14 @@
-//! Axis of a chart: range, scale and labelled ticks.
-
 use super::geometry::Rect;
 use super::svg::{Anchor, Label, QUIET_INK};
 use super::text;
 
-/// An axis of a chart.
+/// Axis of a chart.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Axis {
     /// Quantity with its unit: "load position, mm".
     pub label: String,
-    /// First and last value, in either order. `None`, equal ends, or ends that the scale cannot
-    /// show: the range of the data and marks, padded. A linear axis then ends on round numbers and
-    /// is not padded across zero.
+    /// Ends in either order. `None`, equal or undrawable ends: the padded range of data and marks.
+    /// A linear axis then ends on round numbers, and is not padded across zero.
     pub range: Option<(f64, f64)>,
     /// Mapping of values to lengths.
     pub scale: Scale,
@@ -21,17 +18,17 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// Returns a linear axis with automatic range and ticks.
+    /// Linear axis with automatic range and ticks.
     pub fn linear(label: impl Into<String>) -> Self {
         Axis { label: label.into(), ..Axis::default() }
     }
 
-    /// Returns a logarithmic axis with automatic range and ticks.
+    /// Logarithmic axis with automatic range and ticks.
     pub fn log10(label: impl Into<String>) -> Self {
         Axis { label: label.into(), scale: Scale::Log10, ..Axis::default() }
     }
 
-    /// Sets the range from `low` to `high`.
+    /// Sets the range.
     pub fn from_to(self, low: f64, high: f64) -> Self {
         Axis { range: Some((low, high)), ..self }
     }
@@ -41,13 +38,13 @@ impl Axis {
         Axis { ticks: Some(names), ..self }
     }
 
-    /// Sets ticks at `values` only.
+    /// Sets the ticks.
     pub fn ticks_at(self, values: impl IntoIterator<Item = f64>) -> Self {
         self.named(values.into_iter().map(|value| (value, plain(value))).collect())
     }
 }
 
-/// Mapping of values to lengths along an axis.
+/// Mapping of values to lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Scale {
     /// Equal differences have equal lengths.
@@ -57,7 +54,7 @@ pub enum Scale {
     Log10,
 }
 
-/// Largest drawn magnitude; a larger range could overflow.
+/// Larger magnitudes could overflow.
 const LARGEST: f64 = 1e300;
 const SMALLEST: f64 = 1e-300;
 const PADDING: f64 = 0.04;
@@ -177,8 +174,7 @@ pub(crate) struct Tick {
     pub label: String,
 }
 
-/// Returns the ticks `asked` that fit, or the finest round ones that fit. `fits` must accept a
-/// single tick.
+/// Ticks of `asked` that fit, or the finest round ones. `fits` must accept a single tick.
 pub(crate) fn choose_ticks(
     axis: &AxisScale,
     ticks: Option<&[(f64, String)]>,

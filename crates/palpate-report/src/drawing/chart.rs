@@ -1,11 +1,9 @@
-//! Data of a chart: series, marks and axes, without drawing.
-
 use super::axis::Axis;
 
-/// A chart with title, axes, series and legend.
+/// Chart with title, axes, series and legend.
 ///
 /// Values that are not finite or beyond ±1e300 break a line, as do non-positive values on a
-/// logarithmic axis. A chart without data shows empty axes.
+/// logarithmic axis. Without data the axes are empty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
     /// Heading of at most two lines; may be empty.
@@ -18,9 +16,9 @@ pub struct Chart {
     pub series: Vec<Series>,
     /// Reference lines and shaded ranges behind the data.
     pub marks: Vec<Mark>,
-    /// Width in pixels, limited to 320 to 4,000.
+    /// Width in pixels, clamped to 320–4,000.
     pub width_px: u32,
-    /// Height in pixels with the legend, limited to 280 to 4,000.
+    /// Height in pixels with the legend, clamped to 280–4,000.
     pub height_px: u32,
 }
 
@@ -31,12 +29,12 @@ impl Default for Chart {
 }
 
 impl Chart {
-    /// Returns a chart of 720 × 440 pixels without marks.
+    /// Chart of 720 × 440 pixels without marks.
     pub fn new(title: impl Into<String>, x: Axis, y: Axis, series: Vec<Series>) -> Self {
         Chart { title: title.into(), x, y, series, marks: Vec::new(), width_px: 720, height_px: 440 }
     }
 
-    /// Sets the height of the image.
+    /// Sets the height.
     pub fn with_height(self, height_px: u32) -> Self {
         Chart { height_px, ..self }
     }
@@ -60,17 +58,17 @@ pub struct Series {
 }
 
 impl Series {
-    /// A solid line through `points`.
+    /// Solid line.
     pub fn line(label: impl Into<String>, colour: usize, points: Vec<(f64, f64)>) -> Self {
         Series::new(label, colour, SeriesKind::Line { points, stroke: Stroke::Solid })
     }
 
-    /// A dashed line through `points`.
+    /// Dashed line.
     pub fn dashes(label: impl Into<String>, colour: usize, points: Vec<(f64, f64)>) -> Self {
         Series::new(label, colour, SeriesKind::Line { points, stroke: Stroke::Dashed })
     }
 
-    /// A translucent area between two curves.
+    /// Translucent area between two curves.
     pub fn band(label: impl Into<String>, colour: usize, points: Vec<BandPoint>) -> Self {
         Series::new(label, colour, SeriesKind::Band { points })
     }
@@ -90,7 +88,7 @@ impl Series {
         Series::new(label, colour, SeriesKind::ErrorBars { points, marker })
     }
 
-    /// Returns true for an area between two curves.
+    /// True for a band.
     pub fn is_band(&self) -> bool {
         matches!(self.kind, SeriesKind::Band { .. })
     }
@@ -103,14 +101,14 @@ impl Series {
 /// Shape and data of a series.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SeriesKind {
-    /// A line through the points in order.
+    /// Line through the points in order.
     Line {
         /// (x, y) in units of the axes.
         points: Vec<(f64, f64)>,
         /// Solid or dashed.
         stroke: Stroke,
     },
-    /// A translucent area between two curves.
+    /// Translucent area between two curves.
     Band {
         /// Edges; non-positive ones lie on the end of a logarithmic axis.
         points: Vec<BandPoint>,
@@ -165,7 +163,7 @@ pub struct BandPoint {
     pub high: f64,
 }
 
-/// A value with the ends of its error bar.
+/// Value with an error bar.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorPoint {
     /// Horizontal position.
@@ -178,27 +176,27 @@ pub struct ErrorPoint {
     pub high: f64,
 }
 
-/// A reference behind the data.
+/// Reference behind the data.
 ///
 /// Labels of vertical marks are above the plot, in at most three rows; labels without room are
-/// omitted. Horizontal marks are named in the legend.
+/// omitted. The legend names horizontal marks.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Mark {
-    /// A dashed vertical line, such as a support.
+    /// Dashed vertical line, such as a support.
     VerticalLine {
         /// Position.
         x: f64,
         /// Name; may be empty.
         label: String,
     },
-    /// A dashed horizontal line, such as a tolerance.
+    /// Dashed horizontal line, such as a tolerance.
     HorizontalLine {
         /// Position.
         y: f64,
         /// Name in the legend; may be empty.
         label: String,
     },
-    /// A shaded range of x, such as a portion of a beam.
+    /// Shaded range of x, such as a portion of a beam.
     Span {
         /// One end.
         low: f64,

@@ -1,5 +1,3 @@
-//! A chart as SVG text.
-
 use super::axis::minor_ticks;
 use super::chart::{BandPoint, Chart, ErrorPoint, Mark, Marker, Series, SeriesKind, Stroke};
 use super::geometry::{Point, Rect};
@@ -17,7 +15,7 @@ const CROSS_WIDTH: f64 = 2.0;
 const BAND_OPACITY: f64 = 0.2;
 const SPAN_OPACITY: f64 = 0.05;
 
-/// Draws a chart as a self-contained SVG document of `width_px` × `height_px`.
+/// Draws a self-contained SVG document of `width_px` × `height_px`.
 ///
 /// A legend without room for all names ends with the number of missing ones.
 pub fn chart_to_svg(chart: &Chart) -> String {

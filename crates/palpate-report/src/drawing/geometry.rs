@@ -1,9 +1,7 @@
-//! Rectangles in pixels, and clipping of lines and polygons.
-
-/// A point in pixels, y downward.
+/// In pixels, y downward.
 pub(crate) type Point = (f64, f64);
 
-/// An upright rectangle, y downward.
+/// Upright, y downward.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Rect {
     pub left: f64,

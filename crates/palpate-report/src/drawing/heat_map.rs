@@ -1,5 +1,3 @@
-//! Heat maps of a quantity over a plane, with one colour scale.
-
 use super::axis::{Axis, AxisScale, TICK_SIZE, Tick, choose_ticks, columns_fit, rows_fit, tick_labels};
 use super::chart::Extremes;
 use super::geometry::{Point, Rect};
@@ -23,22 +21,22 @@ const MOST_HEIGHT: f64 = 420.0;
 /// Hides the background between neighbouring cells.
 const OVERLAP: f64 = 0.5;
 
-/// A quantity over a plane.
+/// Quantity over a plane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeatMap {
     /// Heading of at most two lines.
     pub title: String,
-    /// Cells of the plane, with one value each.
+    /// Cells of the plane.
     pub cells: Cells,
     /// Maps.
     pub panels: Vec<HeatPanel>,
-    /// Positions of dots, such as sensors, in millimetres.
+    /// Positions of dots, such as sensors.
     pub dots_mm: Vec<(f64, f64)>,
     /// Quantity of the colours with its unit: "limit, mm".
     pub label: String,
     /// Upper end of the scale; larger values have its colour.
     pub most: f64,
-    /// Width in pixels, limited to 320 to 4,000. The height follows from the plane.
+    /// Width in pixels, clamped to 320–4,000; the plane gives the height.
     pub width_px: u32,
 }
 
@@ -47,12 +45,12 @@ pub struct HeatMap {
 pub struct HeatPanel {
     /// Name; may be empty.
     pub name: String,
-    /// A value for each cell; cells without a finite value are grey.
+    /// Value of each cell; grey if not finite.
     pub values: Vec<f64>,
 }
 
 impl HeatPanel {
-    /// Returns a map; the name may be empty.
+    /// Map; the name may be empty.
     pub fn new(name: impl Into<String>, values: Vec<f64>) -> Self {
         Self { name: name.into(), values }
     }

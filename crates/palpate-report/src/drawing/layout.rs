@@ -1,7 +1,6 @@
 //! Layout of a chart, in pixels.
 //!
-//! Each of title, vertical axis label, names of marks, plot, tick labels, horizontal axis label and
-//! legend has a strip of its own. So no text can lie over data.
+//! Texts, plot and legend have strips of their own, so no text lies over data.
 
 use super::axis::{
     AxisScale, LABEL_GAP, TICK_GAP, TICK_SIZE, Tick, choose_ticks, columns_fit, rows_fit, tick_labels,

@@ -1,5 +1,3 @@
-//! SVG document of shapes in pixels.
-
 use super::geometry::{Point, Rect};
 use std::fmt::{self, Write};
 
@@ -101,7 +99,7 @@ pub(crate) struct Svg {
 }
 
 impl Svg {
-    /// A white image with the reader's sans-serif font.
+    /// White image with the reader's sans-serif font.
     pub fn new(width_px: u32, height_px: u32) -> Self {
         let text = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width_px}\" height=\"{height_px}\" viewBox=\"0 0 {width_px} \

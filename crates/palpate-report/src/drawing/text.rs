@@ -3,7 +3,7 @@
 //! The widths follow the wider common sans-serif fonts (DejaVu Sans, Verdana), so a layout is also
 //! valid for the narrower ones (Arial, Noto Sans).
 
-/// Upper estimate of the width of `text` in pixels.
+/// Upper estimate in pixels.
 pub(crate) fn width(text: &str, size: f64) -> f64 {
     text.chars().map(em).sum::<f64>() * size
 }

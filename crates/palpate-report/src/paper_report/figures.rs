@@ -11,7 +11,7 @@ use palpate_estimators::evaluation::Quantiles;
 use palpate_studies::ArmResults;
 use palpate_studies::paper::COUNTS;
 
-/// A rule of training, at each number of training positions.
+/// Training rule, at each number of positions.
 #[derive(Clone, Copy)]
 struct Family {
     name: &'static str,

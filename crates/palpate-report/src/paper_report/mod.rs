@@ -1,5 +1,3 @@
-//! Report of the founding paper's study.
-
 mod figures;
 mod tables;
 
@@ -17,7 +15,7 @@ use palpate_studies::paper::{Agreement, Claim, PublishedFigure, claims, publishe
 
 const DOI: &str = "https://doi.org/10.5772/53567";
 
-/// Returns `report.html` and its figures as SVG files.
+/// `report.html` and SVG figures.
 ///
 /// Figures 2 to 6 and tables 1 to 3 have the paper's numbers. Parts that need an arm without a fit
 /// are omitted.

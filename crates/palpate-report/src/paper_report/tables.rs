@@ -1,4 +1,4 @@
-//! Tables of the paper's report: tables 1 to 3, replicated figures, claims, and unstated settings.
+//! Tables 1 to 3, replicated figures, claims, and unstated settings.
 
 use maud::{Markup, html};
 
@@ -22,7 +22,7 @@ struct Set<'a> {
 }
 
 impl Paper<'_> {
-    /// Distinct sets that `keep` accepts.
+    /// Distinct sets.
     fn sets(&self, keep: impl Fn(&Arrangement) -> bool) -> Vec<Set<'_>> {
         let mut sets: Vec<Set> = Vec::new();
         for arm in &self.report.study.study.arms {
@@ -321,7 +321,7 @@ fn share(share: f64) -> String {
 /// As the paper prints it, in pascals.
 const PRINTED_MODULUS_PA: f64 = 200e6;
 
-/// Statement of the paper about each setting of the network.
+/// Statements about settings of the network.
 const OF_THE_NETWORK: [(&str, &str); 13] = [
     ("input_scale", "not stated"),
     ("biases", "not stated"),

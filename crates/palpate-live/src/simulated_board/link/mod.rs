@@ -1,5 +1,3 @@
-//! Link of a simulated board.
-
 #[cfg(unix)]
 mod pty;
 mod publisher;
@@ -49,7 +47,7 @@ pub struct LinkError {
     pub error: std::io::Error,
 }
 
-/// An open link.
+/// Open link.
 pub struct Link {
     transport: Transport,
     name: String,
@@ -123,7 +121,7 @@ impl Link {
         Ok(Self { transport: way, name, pending: Vec::new(), received: Vec::new(), unread: 0 })
     }
 
-    /// Name for clients: path or address.
+    /// Path or address for clients.
     pub fn name(&self) -> &str {
         &self.name
     }

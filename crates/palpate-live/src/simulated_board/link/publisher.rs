@@ -1,5 +1,3 @@
-//! MQTT publisher of frames.
-
 use crate::broker::explain;
 use crate::sink::MqttUrl;
 use rumqttc::{Client, Connection, ConnectionError, Event, Packet, QoS};

@@ -66,10 +66,10 @@ impl FoxgloveServer {
         self.address
     }
 
-    /// Returns a sink. A slow client loses the oldest of 1,024 messages.
+    /// Sink; a slow client loses the oldest of 1,024 messages.
     ///
     /// # Errors
-    /// A topic without an encoding, which is not expected.
+    /// A topic without an encoding, not expected.
     pub fn sink(&self, channels: &[Channel], extent: Extent) -> std::io::Result<FoxgloveSink> {
         let json = |topic, name: &str, schema: Vec<u8>| {
             ChannelBuilder::new(topic)

@@ -69,7 +69,7 @@ pub struct Keys<'a> {
 }
 
 impl Keys<'_> {
-    /// Returns the key of a topic.
+    /// Key of a topic.
     pub fn data(&self, topic: Topic) -> String {
         let RosUrl { domain, name, .. } = self.url;
         format!("{domain}/{name}/{}/{}", topic.name(), topic.type_in_key())
@@ -80,14 +80,14 @@ impl Keys<'_> {
         self.token("0/0/NN")
     }
 
-    /// Returns the token of a publisher.
+    /// Token of a publisher.
     pub fn publisher_token(&self, topic: Topic) -> String {
         let topic_name = format!("%{}%{}", self.url.name.replace('/', "%"), topic.name());
         let token = self.token(&format!("0/{}/MP", entity(topic)));
         format!("{token}/{topic_name}/{}/{QUALITY}", topic.type_in_key())
     }
 
-    /// Returns the attachment of a message: number from 1, time, and identity of the publisher.
+    /// Attachment of a message: number from 1, time, and identity of the publisher.
     pub fn attachment(&self, topic: Topic, number: i64, unix_ns: u64) -> [u8; 33] {
         let mut publisher = self.session.1;
         // The identities of a session's publishers differ in this byte, which a shorter identity uses last.

@@ -12,18 +12,18 @@ use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::surface::Extent;
 use serde::Serialize;
 
-/// A message for publication.
+/// Message for publication.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RosMessage {
     /// Topic.
     pub topic: Topic,
-    /// Time in ns since 1970-01-01 00:00 UTC.
+    /// Unix time in ns.
     pub unix_ns: u64,
     /// CDR with its encapsulation.
     pub cdr: Vec<u8>,
 }
 
-/// Returns the messages of an output.
+/// Messages of an output.
 ///
 /// The origin is the left end or the lower left corner; x points along, y across, z out of the surface.
 /// Contacts press along −z; the torque is about the origin.

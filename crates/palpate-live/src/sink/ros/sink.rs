@@ -1,5 +1,3 @@
-//! Sink over a Zenoh session.
-
 use super::keys::{Keys, TOPICS};
 use super::messages::messages;
 use super::url::RosUrl;
@@ -31,7 +29,7 @@ pub struct RosSink {
 }
 
 impl RosSink {
-    /// Creates a node on a router, which may be offline; `reports` receives problems.
+    /// Node on a router, which may be offline; `reports` receives problems.
     ///
     /// # Errors
     /// The system provides no thread.
@@ -56,7 +54,7 @@ impl RosSink {
         Ok(Self { to: Some(to), lost, thread: Some(thread) })
     }
 
-    /// Number of lost samples and events.
+    /// Lost samples and events.
     pub fn lost(&self) -> u64 {
         self.lost.load(Ordering::Relaxed)
     }

@@ -1,5 +1,3 @@
-//! URLs of Zenoh routers for ROS.
-
 use std::fmt;
 use std::str::FromStr;
 
