@@ -48,7 +48,7 @@ impl Chunks {
     /// Returns the next bytes, at least one; `None` after the last.
     ///
     /// # Errors
-    /// A complaint if the source cannot be read; [`Failure::Interrupted`] after a signal.
+    /// [`UserError`] if the source cannot be read; [`Failure::Interrupted`] after a signal.
     pub fn next(&mut self) -> Result<Option<Vec<u8>>, Failure> {
         loop {
             if progress::interrupted() {
@@ -71,8 +71,8 @@ impl Chunks {
             let begins: &[u8] = if bytes.is_empty() { &chunk } else { &bytes };
             let is_utf16 = begins.starts_with(b"\xff\xfe") || begins.starts_with(b"\xfe\xff");
             if let Some(at) = chunk.iter().position(|byte| *byte == 0).filter(|_| !is_utf16) {
-                let complaint = format!("{} is not text: byte {} is 0", self.name, bytes.len() + at + 1);
-                return Err(UserError::new(complaint).help("save it as UTF-8").into());
+                let message = format!("{} is not text: byte {} is 0", self.name, bytes.len() + at + 1);
+                return Err(UserError::new(message).help("save it as UTF-8").into());
             }
             bytes.extend(chunk);
         }
@@ -102,11 +102,11 @@ fn send_all(path: Option<PathBuf>, to: &SyncSender<io::Result<Vec<u8>>>) {
 }
 
 fn unreadable(name: &str, error: &io::Error) -> Failure {
-    let complaint = UserError::new(format!("cannot read {name}: {error}"));
+    let user_error = UserError::new(format!("cannot read {name}: {error}"));
     match error.kind() {
         io::ErrorKind::NotFound => {
-            complaint.help("check the name; it is taken from the current folder").into()
+            user_error.help("check the name; it is taken from the current folder").into()
         }
-        _ => complaint.into(),
+        _ => user_error.into(),
     }
 }

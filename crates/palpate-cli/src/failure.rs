@@ -36,18 +36,18 @@ impl Failure {
         if Cancelled::caused(error) { Self::stopped() } else { UserError::new(error).into() }
     }
 
-    /// Failure of long work: it was stopped, or its input is bad, with details in `complaint`.
-    pub fn of_work<E>(error: E, complaint: impl FnOnce(E) -> UserError) -> Self
+    /// Failure of long work: it was stopped, or its input is bad, with details in `user_error`.
+    pub fn of_work<E>(error: E, user_error: impl FnOnce(E) -> UserError) -> Self
     where
         E: std::error::Error + 'static,
     {
-        if Cancelled::caused(&error) { Self::stopped() } else { complaint(error).into() }
+        if Cancelled::caused(&error) { Self::stopped() } else { user_error(error).into() }
     }
 
     pub fn report(self) -> ExitCode {
         let (message, code) = match self {
-            Self::BadInput(complaint) => {
-                alert!("{:?}", miette::Report::new(*complaint));
+            Self::BadInput(user_error) => {
+                alert!("{:?}", miette::Report::new(*user_error));
                 return ExitCode::from(2);
             }
             Self::NobodyReads => return ExitCode::SUCCESS,
@@ -116,8 +116,8 @@ impl UserError {
 }
 
 impl From<UserError> for Failure {
-    fn from(complaint: UserError) -> Self {
-        Self::BadInput(Box::new(complaint))
+    fn from(user_error: UserError) -> Self {
+        Self::BadInput(Box::new(user_error))
     }
 }
 

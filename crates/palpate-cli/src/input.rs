@@ -29,11 +29,11 @@ pub fn read_rig(path: &Path) -> Result<Rig, Failure> {
 }
 
 pub fn parse_rig(path: &Path, text: &str) -> Result<Rig, Failure> {
-    Rig::from_toml(text).map_err(|error| rig_complaint(error, path, text))
+    Rig::from_toml(text).map_err(|error| rig_error(error, path, text))
 }
 
 pub fn parse_study(name: &str, text: &str) -> Result<Study, Failure> {
-    Study::from_toml(text).map_err(|error| rig_complaint(error, Path::new(name), text))
+    Study::from_toml(text).map_err(|error| rig_error(error, Path::new(name), text))
 }
 
 pub fn read_locator(path: &Path) -> Result<Locator, Failure> {
@@ -41,7 +41,7 @@ pub fn read_locator(path: &Path) -> Result<Locator, Failure> {
 }
 
 pub fn parse_locator(path: &Path, text: &str) -> Result<Locator, Failure> {
-    Locator::from_json(text).map_err(|error| locator_complaint(&error, path, text).into())
+    Locator::from_json(text).map_err(|error| locator_error(&error, path, text).into())
 }
 
 /// Returns true for a file name that ends in `.toml`: a rig or a study.
@@ -114,7 +114,7 @@ fn with_warnings(
     recording: Result<Recording, CsvError>,
     name: &str,
 ) -> Result<Recording, Failure> {
-    let recording = recording.map_err(|error| csv_complaint(&error))?;
+    let recording = recording.map_err(|error| csv_error(&error))?;
     print_dialects(&recording);
     recording.warning_lines().iter().for_each(|warning| remark!("warning: {name}: {warning}"));
     let mismatches = check_recording(setup, &recording);
@@ -163,25 +163,25 @@ fn greater_than_0<T>(
     }
 }
 
-fn rig_complaint(error: RigError, path: &Path, text: &str) -> Failure {
-    let complaint = UserError::new(&error);
-    let complaint = match error.help() {
-        Some(help) => complaint.help(help),
-        None => complaint,
+fn rig_error(error: RigError, path: &Path, text: &str) -> Failure {
+    let user_error = UserError::new(&error);
+    let user_error = match error.help() {
+        Some(help) => user_error.help(help),
+        None => user_error,
     };
     // An error about a missing item is shown at the first line.
-    complaint.at_span(&path.display().to_string(), text, error.span.unwrap_or(0..0)).into()
+    user_error.at_span(&path.display().to_string(), text, error.span.unwrap_or(0..0)).into()
 }
 
-fn locator_complaint(error: &LocatorFileError, path: &Path, text: &str) -> UserError {
-    let complaint = UserError::for_path(path, error);
-    let Some((line, column)) = error.place() else { return complaint };
+fn locator_error(error: &LocatorFileError, path: &Path, text: &str) -> UserError {
+    let user_error = UserError::for_path(path, error);
+    let Some((line, column)) = error.place() else { return user_error };
     let line_text = text.lines().nth(line - 1).unwrap_or_default();
     let start = (column - 1).min(line_text.len());
-    complaint.at_line(&path.display().to_string(), line, line_text, start..line_text.len().min(start + 1))
+    user_error.at_line(&path.display().to_string(), line, line_text, start..line_text.len().min(start + 1))
 }
 
-pub fn csv_complaint(error: &CsvError) -> UserError {
+pub fn csv_error(error: &CsvError) -> UserError {
     match &error.place {
         // The heading above the excerpt states the place.
         Some(place) => UserError::new(&error.problem).at_line(

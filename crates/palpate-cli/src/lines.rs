@@ -68,7 +68,7 @@ impl Lines {
     /// Returns the next line with its end: LF, CR or CRLF.
     ///
     /// # Errors
-    /// A complaint if the source cannot be read; [`Failure::Interrupted`] after a signal.
+    /// [`UserError`] if the source cannot be read; [`Failure::Interrupted`] after a signal.
     pub fn next(&mut self) -> Result<Option<Result<&[u8], TooLong>>, Failure> {
         self.line.clear();
         let mut length = 0;
@@ -178,7 +178,7 @@ impl<P: LineParser> Parsing<P> {
     pub fn next(&mut self, lines: &mut Lines) -> Result<Option<Option<P::Parsed>>, Failure> {
         let Some(line) = lines.next()? else {
             let unfound = self.parser.progress().unfound();
-            return unfound.map_or(Ok(None), |error| Err(input::csv_complaint(&error).into()));
+            return unfound.map_or(Ok(None), |error| Err(input::csv_error(&error).into()));
         };
         match line.map(|line| self.parser.parse_line(line)) {
             Ok(Ok(parsed)) => {
@@ -192,7 +192,7 @@ impl<P: LineParser> Parsing<P> {
                 // A stream without a header may begin within a line.
                 let may_be_torn = self.header == Header::Absent && lines.is_whole();
                 if self.parser.progress().awaits_columns() && !may_be_torn {
-                    return Err(input::csv_complaint(&error).into());
+                    return Err(input::csv_error(&error).into());
                 }
                 lines.skip_reading(&error)?;
             }

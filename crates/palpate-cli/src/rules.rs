@@ -28,15 +28,15 @@ pub fn check_force_rules(rules: &Rules, path: &Path, locator: &Locator) -> Resul
         rule.name,
         locator.kind()
     );
-    let complaint = UserError::for_path(path, problem);
-    Err(complaint.help("remove `force`, or fit an estimator of the force, such as `influence`").into())
+    let user_error = UserError::for_path(path, problem);
+    Err(user_error.help("remove `force`, or fit an estimator of the force, such as `influence`").into())
 }
 
 pub fn refuse_publishing(publishing: &Rules, path: &Path, help: &str) -> Result<(), Failure> {
     let Some(rule) = publishing.as_slice().first() else { return Ok(()) };
-    let complaint = UserError::for_path(
+    let user_error = UserError::for_path(
         path,
         format!("rule `{}` publishes a message, but no broker is given", rule.name),
     );
-    Err(complaint.help(help).into())
+    Err(user_error.help(help).into())
 }

@@ -49,16 +49,16 @@ impl TareOption {
 
     pub fn check_recorded(&self, files: &RecordingFiles) -> Result<(), Failure> {
         if self.tare.is_some() && files.data.is_none() {
-            let complaint = UserError::new("--tare needs a recording: simulated calibrations start at zero");
-            return Err(complaint.help("--data names a recording to evaluate on").into());
+            let user_error = UserError::new("--tare needs a recording: simulated calibrations start at zero");
+            return Err(user_error.help("--data names a recording to evaluate on").into());
         }
         Ok(())
     }
 
     pub fn check_drifts(&self, files: &RecordingFiles, setup: &Setup) -> Result<(), Failure> {
         if self.tare.is_some() && files.data.is_none() && setup.imperfections().is_none() {
-            let complaint = UserError::new("--tare: simulated readings do not drift");
-            return Err(complaint.help("--data names a recording to evaluate on").into());
+            let user_error = UserError::new("--tare: simulated readings do not drift");
+            return Err(user_error.help("--data names a recording to evaluate on").into());
         }
         Ok(())
     }
@@ -225,12 +225,12 @@ impl<'a> Taring<'a> {
             Source::File(path) => taring.read(&path, no_header)?,
             Source::First(_) => {}
             Source::Auto { .. } | Source::Last { .. } if locator.false_alarm_rate().is_none() => {
-                let complaint = format!(
+                let message = format!(
                     "--tare {}: a locator of kind `{}` cannot distinguish untouched readings from contacts",
                     source.updated_label().unwrap_or_default(),
                     locator.kind()
                 );
-                return Err(UserError::new(complaint)
+                return Err(UserError::new(message)
                     .help("--tare N uses the first N readings as untouched, --tare FILE those of a file")
                     .into());
             }
@@ -246,13 +246,15 @@ impl<'a> Taring<'a> {
             self.add(&reading).map_err(|error| UserError::for_path(path, error))?;
         }
         if !readings.lines.is_whole() {
-            let complaint =
+            let user_error =
                 UserError::for_path(path, "not every line is a reading, so the tare would be wrong");
-            return Err(complaint.help("correct the lines above, or remove them").into());
+            return Err(user_error.help("correct the lines above, or remove them").into());
         }
         if self.count == 0 {
-            let complaint = UserError::for_path(path, "it contains no untouched reading");
-            return Err(complaint.help("it must begin with a header; --no-header reads values alone").into());
+            let user_error = UserError::for_path(path, "it contains no untouched reading");
+            return Err(user_error
+                .help("it must begin with a header; --no-header reads values alone")
+                .into());
         }
         self.report_baseline();
         Ok(())
@@ -384,11 +386,11 @@ impl<'a> Taring<'a> {
     pub fn finish(&self, source: &str) -> Result<(), Failure> {
         if self.is_beginning {
             let needed = self.source.first();
-            let complaint = format!(
+            let message = format!(
                 "--tare {needed}: {source} contains {} readings; the first {needed} must be untouched",
                 self.count
             );
-            return Err(UserError::new(complaint).help("give fewer, or record longer").into());
+            return Err(UserError::new(message).help("give fewer, or record longer").into());
         }
         if let Some(followed) = self.source.updated_label() {
             self.print_updated_baseline(followed, source);
@@ -408,8 +410,8 @@ pub fn tare_splits(
     match option.tare {
         Some(Source::Auto { first: Start::NONE }) => {}
         Some(_) => {
-            let complaint = "--tare accepts only `auto` here; N, a time, a FILE and `last` need a locator: a rig is evaluated by folds of one recording";
-            return Err(UserError::new(complaint)
+            let message = "--tare accepts only `auto` here; N, a time, a FILE and `last` need a locator: a rig is evaluated by folds of one recording";
+            return Err(UserError::new(message)
                 .help("--tare auto subtracts the drift that the presses show")
                 .into());
         }

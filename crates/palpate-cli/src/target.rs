@@ -84,11 +84,11 @@ impl Target {
         let target = Self { path: path.to_owned(), inputs: inputs.clone() };
         let place = target.place()?;
         if let Some(name) = result_beside(&place) {
-            let complaint = format!(
+            let message = format!(
                 "cannot write {}: it is a result of the study with {name} in the same folder",
                 path.display()
             );
-            return Err(UserError::new(complaint).help("name another file").into());
+            return Err(UserError::new(message).help("name another file").into());
         }
         check_takes_files(folder_of(&place)).map_err(|error| cannot("write", path, &error))?;
         Ok(target)
@@ -108,8 +108,8 @@ impl Target {
     fn place(&self) -> Result<PathBuf, Failure> {
         let refused = |why: &str| UserError::new(format!("cannot write {}: {why}", self.path.display()));
         if self.path == Path::new("-") {
-            let complaint = refused("stdout is reserved for the output of the command");
-            return Err(complaint.help("name a file; a file named `-` is `./-`").into());
+            let user_error = refused("stdout is reserved for the output of the command");
+            return Err(user_error.help("name a file; a file named `-` is `./-`").into());
         }
         if self.path.file_name().is_none() && !self.path.is_dir() {
             return Err(refused("it names no file").into());
@@ -181,10 +181,10 @@ impl TargetFolder {
             None => Ok(folder),
             Some(name) => {
                 let found = path.join(name);
-                let complaint =
+                let message =
                     format!("cannot write a report into {}: a study's {name} is there", path.display());
                 let help = format!("name another folder, or remove {}", found.display());
-                Err(UserError::new(complaint).help(help).into())
+                Err(UserError::new(message).help(help).into())
             }
         }
     }

@@ -268,11 +268,12 @@ fn check_intervals<E: Fit + ?Sized>(
     let folds = check_folds(recording.distinct_positions().len());
     let Ok(mut splits) = Split::by_folds(recording, folds) else { return Ok(None) };
     let drifts = estimator.drift_course(FitTask { recording, ..task }, recording).is_some();
-    for Split { training, held_out: judged, offsets, .. } in &mut splits {
-        let kept: Vec<usize> = thinned(judged.rows.len(), MOST_PRESSES_CHECKED).collect();
-        *judged = judged.subset(&kept);
-        *offsets =
-            drifts.then(|| estimator.drift_course(FitTask { recording: training, ..task }, judged)).flatten();
+    for Split { training, held_out, offsets, .. } in &mut splits {
+        let kept: Vec<usize> = thinned(held_out.rows.len(), MOST_PRESSES_CHECKED).collect();
+        *held_out = held_out.subset(&kept);
+        *offsets = drifts
+            .then(|| estimator.drift_course(FitTask { recording: training, ..task }, held_out))
+            .flatten();
     }
     let fit = |fold: usize, task: FitTask<'_>| {
         task.watch.counted("checking intervals", "folds", fold, folds)?;
@@ -313,24 +314,24 @@ impl HoldOutTask<'_> {
         fit: impl Fn(usize, FitTask) -> Result<(Fitted<M>, f64), E>,
     ) -> Result<HeldOut, HoldOutError<E>> {
         let Self { setup, splits, seed, clock, watch, memo } = *self;
-        let mut held_out = HeldOut { estimates: Vec::new(), fitting_s: 0.0, locating_s: 0.0 };
-        for (fold, Split { training, held_out: judged, offsets, .. }) in splits.iter().enumerate() {
+        let mut results = HeldOut { estimates: Vec::new(), fitting_s: 0.0, locating_s: 0.0 };
+        for (fold, Split { training, held_out, offsets, .. }) in splits.iter().enumerate() {
             let start = clock();
             let task = FitTask { setup, recording: training, seed, watch, memo };
             let (locator, shared_s) = fit(fold, task).map_err(HoldOutError::Fit)?;
             let fitted = clock();
             let tared =
-                offsets.as_ref().map(|course| course.tared(judged, locator.method.offsets().as_deref()));
-            let presses = tared.as_ref().unwrap_or(judged).rows.iter().filter(|row| row.touches());
+                offsets.as_ref().map(|course| course.tared(held_out, locator.method.offsets().as_deref()));
+            let presses = tared.as_ref().unwrap_or(held_out).rows.iter().filter(|row| row.touches());
             for row in presses {
                 let estimate = locator.locate(&row.reading).map_err(HoldOutError::Reading)?;
                 let (truth, force_n) = (row.position, row.force_n);
-                held_out.estimates.push(HeldOutEstimate { truth, force_n, estimate, fold });
+                results.estimates.push(HeldOutEstimate { truth, force_n, estimate, fold });
             }
-            held_out.fitting_s += fitted - start + shared_s;
-            held_out.locating_s += clock() - fitted;
+            results.fitting_s += fitted - start + shared_s;
+            results.locating_s += clock() - fitted;
         }
-        Ok(held_out)
+        Ok(results)
     }
 }
 

@@ -187,9 +187,9 @@ impl Layout {
     }
 
     /// Disables or enables a sensor, by index.
-    pub fn set_disabled(&mut self, sensor: usize, dead: bool) {
+    pub fn set_disabled(&mut self, sensor: usize, disabled: bool) {
         if let Some(sensor) = self.sensors.get_mut(sensor) {
-            sensor.channel.disabled = dead;
+            sensor.channel.disabled = disabled;
         }
     }
 
@@ -229,9 +229,9 @@ impl Layout {
     /// [`NoiseError`] for singular noise, or no active sensor.
     pub fn reading_sds(&self) -> Result<Vec<Option<f64>>, NoiseError> {
         let sds = self.sensors.iter().enumerate().map(|(i, sensor)| {
-            let ChannelModel { noise_sd, resolution, disabled: dead, .. } = sensor.channel;
+            let ChannelModel { noise_sd, resolution, disabled, .. } = sensor.channel;
             let sd = sensor.channel.reading_sd();
-            if dead {
+            if disabled {
                 Ok(None)
             } else if sd > 0.0 && sd.is_finite() {
                 Ok(Some(sd))

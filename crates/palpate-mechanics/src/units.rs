@@ -79,7 +79,7 @@ pub enum UnitError {
         unit: String,
     },
     /// The unit is unknown or of another dimension.
-    #[error("{} `{unit}`; {} is one of {}", complaint(unit), wanted.noun(), Symbols(Some(*wanted)))]
+    #[error("{} `{unit}`; {} is one of {}", unit_problem(unit), wanted.noun(), Symbols(Some(*wanted)))]
     WrongUnit {
         /// Text after the number.
         unit: String,
@@ -102,7 +102,7 @@ pub enum UnitError {
     },
 }
 
-fn complaint(unit: &str) -> &'static str {
+fn unit_problem(unit: &str) -> &'static str {
     if Unit::from_symbol(unit).is_some() { "wrong unit" } else { "unknown unit" }
 }
 

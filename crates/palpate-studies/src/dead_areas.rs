@@ -238,13 +238,13 @@ impl ArraySensor {
     /// Simulates calibrations with test presses at 399 positions, l/400 apart.
     pub fn trials(&self, count: u64, seed: u64) -> Vec<Split> {
         let length_m = self.rig.setup.surface().extent().length_m();
-        let judged: Vec<Position> =
+        let touches: Vec<Position> =
             (1..400).map(|i| Position::along(f64::from(i) / 400.0 * length_m)).collect();
         let trial = |k: u64| {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_add(k));
             let training = self.recording(&self.presses, seed, &mut rng);
-            let judged = self.recording(&judged, seed, &mut rng);
-            Split { training, held_out: judged, offsets: None, origin: SplitOrigin::Calibration }
+            let held_out = self.recording(&touches, seed, &mut rng);
+            Split { training, held_out, offsets: None, origin: SplitOrigin::Calibration }
         };
         (0..count).map(trial).collect()
     }

@@ -87,9 +87,9 @@ fn dead_areas(size: Size, progress: Progress) -> Result<Vec<Table>> {
         .rev()
         .flat_map(|sensors| seeds.clone().map(|seed| DeadAreaCase { sensors: *sensors, seed }))
         .collect();
-    let without = size.pick(&[][..], &["network", "network-lm"]);
+    let excluded = size.pick(&[][..], &["network", "network-lm"]);
     let name = |case: &DeadAreaCase| format!("{} sensors", case.sensors);
-    let results = in_parallel(&cases, |case| case.results(without), name, progress);
+    let results = in_parallel(&cases, |case| case.results(excluded), name, progress);
     let results: Vec<DeadAreaResults> = results.into_iter().collect::<Result<_>>()?;
     let columns = vec![
         Column::percent("effective length", Goal::Larger),
@@ -103,13 +103,13 @@ fn dead_areas(size: Size, progress: Progress) -> Result<Vec<Table>> {
 }
 
 impl DeadAreaCase {
-    fn results(self, without: &[&'static str]) -> Result<DeadAreaResults> {
+    fn results(self, excluded: &[&'static str]) -> Result<DeadAreaResults> {
         let study = DeadAreas {
             rig: Rig::from_toml(dead_areas::RIG_TOML)?,
             counts: vec![self.sensors],
             calibrations: 1,
             tolerance_m: 2e-3,
-            excluded: without.to_vec(),
+            excluded: excluded.to_vec(),
             seed: self.seed,
         };
         Ok(study.run(Watch::NONE)?)
@@ -136,8 +136,8 @@ fn dead_area_rows(cases: &[DeadAreaCase], results: &[DeadAreaResults], counts: &
                     errors.iter_mut().zip(figures_m).for_each(|(sample, m)| sample.add(case.seed, 1e3 * m));
                 }
             }
-            let mut left_out = results.omitted.iter();
-            failure = failure.or(left_out
+            let mut omitted = results.omitted.iter();
+            failure = failure.or(omitted
                 .find(|(of, kind, ..)| (of.as_str(), *kind) == (sensing, estimator))
                 .map(|(.., reason)| reason.clone()));
         }

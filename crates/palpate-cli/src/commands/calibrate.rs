@@ -231,8 +231,8 @@ pub fn stage(
         return Ok(None);
     }
     let Some(stage) = &rig.stage else {
-        let complaint = UserError::for_path(path, "--stage needs the rig's section [stage]");
-        return Err(complaint
+        let user_error = UserError::for_path(path, "--stage needs the rig's section [stage]");
+        return Err(user_error
             .help("docs/how-to/press-with-a-machine.md describes it; `origin`, `touch` and `depths` are required")
             .into());
     };
@@ -256,8 +256,8 @@ fn rows_before(
 ) -> Result<(Vec<Row>, Option<f64>), Failure> {
     let path = &arguments.presses;
     if path.exists() && !arguments.resume {
-        let complaint = UserError::new(format!("{} exists already", path.display()));
-        return Err(complaint
+        let user_error = UserError::new(format!("{} exists already", path.display()));
+        return Err(user_error
             .help("--resume continues with its presses; another name starts a new calibration")
             .into());
     }
@@ -286,11 +286,11 @@ pub fn journal_heading(rig: &Path) -> String {
 }
 
 pub fn journal_failure(rig: &Path, error: &JournalError) -> Failure {
-    let complaint = match error {
+    let user_error = match error {
         JournalError::Nuisance { .. } | JournalError::Numbered => UserError::for_path(rig, error),
         _ => UserError::new(error),
     };
-    complaint.help(error.help()).into()
+    user_error.help(error.help()).into()
 }
 
 type Replan<'a> = &'a dyn Fn(&[Row]) -> Result<Vec<Press>, UserError>;
@@ -315,9 +315,9 @@ impl Bench<'_> {
     fn set_up(&self, stage: &mut Stage) -> Result<bool, Failure> {
         let Self { arguments, rig, clock, .. } = self;
         let (Some(url), Some(keys)) = (arguments.machine(), self.keys) else {
-            let complaint =
+            let user_error =
                 UserError::new("--jog needs the keyboard, and --from - takes the readings from it");
-            return Err(complaint.help("give the readings by another source").into());
+            return Err(user_error.help("give the readings by another source").into());
         };
         // This calibration has no presses, so it writes no file.
         let journal =
@@ -665,7 +665,9 @@ fn finish(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(Locator, Re
     let recording = input::read_recording(&rig.setup, &arguments.presses)?;
     let task = FitTask::new(&rig.setup, &recording).seed(arguments.seed);
     let failed = |error: &(dyn std::error::Error + 'static)| match Failure::from_error(error) {
-        Failure::BadInput(complaint) => complaint.help("press at more positions: --resume continues").into(),
+        Failure::BadInput(user_error) => {
+            user_error.help("press at more positions: --resume continues").into()
+        }
         other => other,
     };
     let observer = Observer::of_rounds(rig.estimator.most_rounds());

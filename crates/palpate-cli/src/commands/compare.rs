@@ -79,10 +79,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let folder = folder.map(|folder| TargetFolder::for_report(folder, &inputs)).transpose()?;
     let rig = input::read_rig(&arguments.rig)?;
     let Trials { data, source, how, trials } = trials(arguments, &rig)?;
-    let ComparisonResult { comparisons, omitted: left_out } = compare(arguments, &rig, &trials)?;
+    let ComparisonResult { comparisons, omitted } = compare(arguments, &rig, &trials)?;
     let readings: usize = trials.iter().map(|trial| trial.held_out.rows.len()).sum();
     if let Some(folder) = &folder {
-        write_report(arguments, &rig, &how, &comparisons, &left_out, folder)?;
+        write_report(arguments, &rig, &how, &comparisons, &omitted, folder)?;
         let comment =
             format!("estimators compared on {}, {source}, seed {}", arguments.rig.display(), arguments.seed);
         errors_table(&comment, &comparisons, rig.setup.surface().extent()).write(folder, ERRORS_CSV)?;
@@ -101,12 +101,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "length_mm": rig.setup.surface().extent().length_m() * 1e3,
             "tolerance_mm": arguments.tolerance * 1e3,
             "estimators": estimators.collect::<Vec<_>>(),
-            "left_out": left_out.iter().map(|(name, why)| object! { "name": name, "why": why }).collect::<Vec<_>>(),
+            "omitted": omitted.iter().map(|(name, why)| object! { "name": name, "why": why }).collect::<Vec<_>>(),
         });
     }
     output::print_line(format!("{}: {how}; {readings} readings\n", arguments.rig.display()))?;
     output::print_line(table(&rig, &comparisons, arguments))?;
-    for (name, why) in &left_out {
+    for (name, why) in &omitted {
         output::print_line(format!("\n{name} is skipped: {why}"))?;
     }
     output::print_report_path("\n", arguments.report.as_deref())
@@ -117,7 +117,7 @@ fn write_report(
     rig: &Rig,
     how: &str,
     comparisons: &[Comparison],
-    left_out: &[OmittedEstimator],
+    omitted: &[OmittedEstimator],
     folder: &TargetFolder,
 ) -> Result<(), Failure> {
     let report = ComparisonReport {
@@ -125,7 +125,7 @@ fn write_report(
         setup: &rig.setup,
         trials: how,
         comparisons,
-        omitted: left_out,
+        omitted,
         tolerance_m: arguments.tolerance,
         seed: arguments.seed,
     };
@@ -135,8 +135,8 @@ fn write_report(
 fn errors_table(comment: &str, comparisons: &[Comparison], extent: Extent) -> CsvTable {
     let columns = [vec!["estimator"], tables::position_columns(extent), ERROR_COLUMNS.to_vec()].concat();
     let mut table = CsvTable::new(comment, columns);
-    for Comparison { estimator, timed: tried } in comparisons {
-        for (position, evaluation) in tried.evaluation.by_position() {
+    for Comparison { estimator, timed } in comparisons {
+        for (position, evaluation) in timed.evaluation.by_position() {
             let position = tables::position_cells(position, extent);
             table.row(
                 [vec![estimator.name().to_owned()], position, tables::error_cells(&evaluation)].concat(),
@@ -149,8 +149,8 @@ fn errors_table(comment: &str, comparisons: &[Comparison], extent: Extent) -> Cs
 fn trials_table(comment: &str, comparisons: &[Comparison], trials: &[Split]) -> CsvTable {
     let columns = [vec!["estimator", "trial"], ERROR_COLUMNS.to_vec()].concat();
     let mut table = CsvTable::new(comment, columns);
-    for Comparison { estimator, timed: tried } in comparisons {
-        let Evaluation { extent, located } = &tried.evaluation;
+    for Comparison { estimator, timed } in comparisons {
+        let Evaluation { extent, located } = &timed.evaluation;
         let mut rest = located.as_slice();
         for (number, trial) in trials.iter().enumerate() {
             // The answers of all trials are concatenated.
@@ -181,14 +181,14 @@ fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
             Failure::of_work(error, |error| about(error).help("--data names a recording to compare on"))
         })?;
         let calibrations = arguments.calibrations;
-        let judged = trials.first().map_or(0, |trial| trial.held_out.rows.len());
+        let held_out = trials.first().map_or(0, |trial| trial.held_out.rows.len());
         let forces = match rig.setup.force_n() {
             Some(_) => "",
             None => " by the force of the presses, half and twice that in turn",
         };
         let plural = if calibrations == 1 { "" } else { "s" };
         let how = format!(
-            "{calibrations} simulated calibration{plural}, evaluated at {judged} positions each{forces}"
+            "{calibrations} simulated calibration{plural}, evaluated at {held_out} positions each{forces}"
         );
         return Ok(Trials { data: "simulation".to_owned(), source: how.clone(), how, trials });
     };
@@ -207,8 +207,8 @@ fn compare(arguments: &Arguments, rig: &Rig, trials: &[Split]) -> Result<Compari
     let rows = trials.first().map_or(0, |trial| trial.training.rows.len());
     let contenders = contenders(&rig.setup, &rig.estimator, rows);
     let contenders = select(contenders, &arguments.only).map_err(|UnknownEstimator { name, known }| {
-        let complaint = UserError::new(format!("--only {name}: no estimator of this kind suits the rig"));
-        complaint.help(format!("it can be: {}", known.join(", ")))
+        let user_error = UserError::new(format!("--only {name}: no estimator of this kind suits the rig"));
+        user_error.help(format!("it can be: {}", known.join(", ")))
     })?;
     // A single estimator is refused; among several it is omitted.
     if let ([only], Some(trial)) = (&contenders[..], trials.first()) {

@@ -175,7 +175,7 @@ fn cross_validated(arguments: &Arguments, mut rig: Box<Rig>) -> Result<Evaluatio
         Some(recording) => recording,
         None => Observer::of_stages()
             .watch(|watch| rig.simulate_calibration_watched(arguments.seed, watch))
-            .map_err(|error| Failure::of_work(error, simulation_complaint))?,
+            .map_err(|error| Failure::of_work(error, simulation_error))?,
     };
     let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
     let cost = rig.estimator.fit_cost(&rig.setup, &recording);
@@ -227,7 +227,7 @@ fn located(arguments: &Arguments, locator: Box<Locator>) -> Result<EvaluationRes
     })
 }
 
-fn simulation_complaint(error: impl std::fmt::Display) -> UserError {
+fn simulation_error(error: impl std::fmt::Display) -> UserError {
     UserError::new(error).help("--data names a recording to evaluate on")
 }
 
@@ -235,7 +235,7 @@ fn simulated(locator: &Locator, seed: u64) -> Result<Recording, Failure> {
     let calibration = &locator.provenance.recording;
     Observer::of_stages()
         .watch(|watch| simulate_use_all_over_watched(&locator.setup, calibration, seed, watch))
-        .map_err(|error| Failure::of_work(error, simulation_complaint))
+        .map_err(|error| Failure::of_work(error, simulation_error))
 }
 
 fn warn_of_training_data(locator: &Locator, recording: &Recording) {

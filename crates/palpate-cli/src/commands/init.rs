@@ -87,13 +87,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let name = arguments.recording.display().to_string();
     let bytes = input::read_bytes(&arguments.recording)?;
     let first =
-        FirstRig::infer(&name, &bytes, &arguments.hints()).map_err(|error| complaint(&error, &name))?;
+        FirstRig::infer(&name, &bytes, &arguments.hints()).map_err(|error| user_error(&error, &name))?;
     let rig_name = arguments.out.as_ref().map_or("RIG.toml".to_owned(), |out| out.display().to_string());
     let text = first.to_toml(&rig_name);
     // Parsed as in every later command, so that warnings about file and channels appear now.
     let rig = Rig::from_toml(&text).map_err(UserError::new)?;
     let recording = rig.setup.read_recording(&name, bytes.as_slice());
-    let recording = recording.map_err(|error| input::csv_complaint(&error))?;
+    let recording = recording.map_err(|error| input::csv_error(&error))?;
     input::print_dialects(&recording);
     first.warnings().iter().for_each(|warning| remark!("warning: {name}: {warning}"));
     if recording.has_unreliable_noise() {
@@ -122,8 +122,8 @@ impl Arguments {
         let Some(out) = &self.out else { return Ok(None) };
         let target = Target::new(out, &Inputs::new([self.recording.as_path()]))?;
         if out.exists() && !self.overwrite {
-            let complaint = UserError::new(format!("{} exists already", out.display()));
-            return Err(complaint.help("name another file, or overwrite it with --overwrite").into());
+            let user_error = UserError::new(format!("{} exists already", out.display()));
+            return Err(user_error.help("name another file, or overwrite it with --overwrite").into());
         }
         Ok(Some(target))
     }
@@ -144,14 +144,14 @@ impl Arguments {
     }
 }
 
-fn complaint(error: &FirstRigError, name: &str) -> Failure {
-    let complaint = match error {
-        FirstRigError::Csv(error) => input::csv_complaint(error),
+fn user_error(error: &FirstRigError, name: &str) -> Failure {
+    let user_error = match error {
+        FirstRigError::Csv(error) => input::csv_error(error),
         _ => UserError::new(format!("{name}: {error}")),
     };
     match error.help() {
-        Some(help) => complaint.help(help).into(),
-        None => complaint.into(),
+        Some(help) => user_error.help(help).into(),
+        None => user_error.into(),
     }
 }
 

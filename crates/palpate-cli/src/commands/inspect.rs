@@ -66,7 +66,7 @@ fn csv(path: &Path, bytes: &[u8], rig: Option<&Path>) -> Result<Vec<String>, Fai
 
 fn table(path: &Path, bytes: &[u8]) -> Result<Vec<String>, Failure> {
     let lines = table_in_words(&path.display().to_string(), bytes);
-    let mut lines = lines.map_err(|error| input::csv_complaint(&error))?;
+    let mut lines = lines.map_err(|error| input::csv_error(&error))?;
     lines.push(
         "--rig RIG reads it as a recording of that rig; palpate init writes a first rig for it".to_owned(),
     );

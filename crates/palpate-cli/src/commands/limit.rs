@@ -84,7 +84,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let folder = folder.map(|folder| TargetFolder::for_report(folder, &inputs)).transpose()?;
     let bench = RigOrLocator::read(&arguments.rig)?;
     let setup = setup(&bench, arguments)?;
-    let complain = |error| complaint(error, &arguments.rig);
+    let complain = |error| user_error(error, &arguments.rig);
     let extent = setup.surface().extent();
     let listed = match arguments.every {
         Some(every_m) => positions_with_spacing(extent, every_m).map_err(complain)?,
@@ -150,16 +150,16 @@ fn setup(bench: &RigOrLocator, arguments: &Arguments) -> Result<Setup, Failure> 
         }
     };
     if let (Some(_), Some(noise)) = (force_linear_locator(bench), arguments.noise.first()) {
-        let complaint =
+        let message =
             format!("--noise {noise}: the noise of a locator of a measured surface is what it learnt");
-        return Err(UserError::new(complaint).help("leave --noise out").into());
+        return Err(UserError::new(message).help("leave --noise out").into());
     }
     for noise in &arguments.noise {
         setup = setup.with_noise(*noise).map_err(|error| match error {
             SetupError::NoSensorOfUnit { .. } => {
-                let complaint =
+                let user_error =
                     UserError::new(format!("--noise {noise}: no sensor of the rig measures in this unit"));
-                complaint.help("give the noise in the unit of the readings, as in \"5 um\"")
+                user_error.help("give the noise in the unit of the readings, as in \"5 um\"")
             }
             error => UserError::new(format!("--noise {noise}: {error}")),
         })?;
@@ -167,11 +167,11 @@ fn setup(bench: &RigOrLocator, arguments: &Arguments) -> Result<Setup, Failure> 
     Ok(setup)
 }
 
-fn complaint(error: LimitError, rig: &Path) -> Failure {
+fn user_error(error: LimitError, rig: &Path) -> Failure {
     if Cancelled::caused(&error) {
         return Failure::stopped();
     }
-    let complaint = UserError::for_path(rig, error);
+    let user_error = UserError::for_path(rig, error);
     let help = match error {
         LimitError::NoModel => {
             "fit `kind = \"influence\"` to a recording with forces, and name its locator instead of the rig; or give a surface with a model, such as `kind = \"beam\"`"
@@ -186,7 +186,7 @@ fn complaint(error: LimitError, rig: &Path) -> Failure {
         LimitError::Surface(error) => error.help(),
         LimitError::Cancelled(_) => "start it again",
     };
-    complaint.help(help).into()
+    user_error.help(help).into()
 }
 
 fn limits<'a>(

@@ -59,9 +59,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         left_out.map_err(|error| UserError::new(format!("--disable {channel}: {error}")))?;
     }
     if arguments.shape.is_some() && locator.kind() != "digit" {
-        let complaint =
-            format!("--shape: a locator of kind `{}` does not estimate the shape", locator.kind());
-        return Err(UserError::new(complaint).help("only the `digit` estimator does").into());
+        let message = format!("--shape: a locator of kind `{}` does not estimate the shape", locator.kind());
+        return Err(UserError::new(message).help("only the `digit` estimator does").into());
     }
     let path = arguments.readings.as_deref().unwrap_or(Path::new("-"));
     let tare = arguments.tare.in_use(&locator);
@@ -98,8 +97,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         output::flush(&mut out)?;
     }
     if readings.awaits_columns() && readings.lines.is_whole() {
-        let complaint = UserError::new(format!("{} contains no reading", readings.lines.name()));
-        return Err(complaint.help("it must begin with a header; --no-header reads values alone").into());
+        let user_error = UserError::new(format!("{} contains no reading", readings.lines.name()));
+        return Err(user_error.help("it must begin with a header; --no-header reads values alone").into());
     }
     if let Some(taring) = &taring {
         taring.finish(readings.lines.name())?;

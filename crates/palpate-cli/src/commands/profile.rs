@@ -60,7 +60,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         RigOrLocator::Rig(rig) => LoadSensors::from_setup_watched(&rig.setup, watch),
         RigOrLocator::Locator(locator) => locator.load_sensors_watched(watch),
     });
-    let sensors = sensors.map_err(|error| Failure::of_work(error, |error| sensors_complaint(error, path)))?;
+    let sensors = sensors.map_err(|error| Failure::of_work(error, |error| sensors_error(error, path)))?;
     let profiler = Profiler::new(sensors);
     let mut printer = Printer {
         arguments,
@@ -76,7 +76,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-fn sensors_complaint(error: LoadSensorsError, path: &Path) -> UserError {
+fn sensors_error(error: LoadSensorsError, path: &Path) -> UserError {
     let help = match error {
         LoadSensorsError::NoModel => "give a surface with a model, such as `kind = \"beam\"`",
         LoadSensorsError::Noise(ref error) => error.help(),
@@ -102,10 +102,10 @@ impl Printer<'_> {
         };
         if loads.is_empty() {
             let path = self.arguments.subject.display();
-            let complaint =
+            let user_error =
                 UserError::new(format!("{path} has no [[load]] to simulate, and no readings are given"));
             let help = "name a file of readings, or add [[load]] with `from`, `to` and `force` to the rig";
-            return Err(complaint.help(help).into());
+            return Err(user_error.help(help).into());
         }
         self.truth = loads;
         let (setup, seed) = (self.subject.setup(), self.arguments.seed);

@@ -110,9 +110,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let source = Source::open(&arguments.from, Path::new(""), clock, to.clone()).map_err(UserError::new)?;
     if !commanding.as_slice().is_empty() {
         let commander = source.commander().map_err(|error| {
-            let complaint =
+            let user_error =
                 UserError::new(format!("--from {}: --rules has a `command`: {error}", arguments.from));
-            complaint.help("name a source with a way back, or remove rules with `command`")
+            user_error.help("name a source with a way back, or remove rules with `command`")
         })?;
         sinks.push(Box::new(CommandSink::new(commanding, commander, to.clone())));
     }

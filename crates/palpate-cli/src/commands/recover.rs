@@ -34,8 +34,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let Arguments { recording, out, .. } = arguments;
     Target::new(out, &Inputs::new([recording.as_path()]))?;
     if out.exists() {
-        let complaint = UserError::new(format!("{} exists already", out.display()));
-        return Err(complaint.help("name another file with --out").into());
+        let user_error = UserError::new(format!("{} exists already", out.display()));
+        return Err(user_error.help("name another file with --out").into());
     }
     let recovery = recording::recover(recording, out).map_err(UserError::new)?;
     if recovery.was_whole {

@@ -198,9 +198,9 @@ fn check_channels(head: &Head, locator: &Locator) -> Result<(), Failure> {
     let shown = |channels: &[(String, String)]| {
         channels.iter().map(|(name, unit)| format!("{name} ({unit})")).collect::<Vec<_>>().join(", ")
     };
-    let complaint =
+    let message =
         format!("the recording has the channels {}; the locator needs {}", shown(&there), shown(&wanted));
-    Err(UserError::new(complaint).into())
+    Err(UserError::new(message).into())
 }
 
 fn is_the_same(estimate: &EstimateRecord, before: &Map<String, Value>) -> bool {

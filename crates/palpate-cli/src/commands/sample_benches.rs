@@ -139,8 +139,8 @@ pub fn run(request: &Request) -> Result<(), Failure> {
     let paths = Paths::new(bench, folder);
     let written = [&paths.rig, &paths.presses, &paths.touches];
     if let (false, Some(path)) = (overwrite, written.iter().find(|path| path.exists())) {
-        let complaint = UserError::new(format!("{} already exists", path.display()));
-        return Err(complaint.help("name another folder, or overwrite its files by --overwrite").into());
+        let user_error = UserError::new(format!("{} already exists", path.display()));
+        return Err(user_error.help("name another folder, or overwrite its files by --overwrite").into());
     }
     let files = bench.files(&file_name(&paths.rig), &file_name(&paths.presses))?;
     fs::create_dir_all(folder).map_err(|error| crate::target::cannot("make the folder", folder, &error))?;

@@ -176,9 +176,9 @@ fn check_folder(folder: &Path) -> Result<(), Failure> {
     let is_there = |path: &&Path| path.as_os_str().is_empty() || path.symlink_metadata().is_ok();
     match folder.ancestors().find(is_there) {
         Some(found) if !found.as_os_str().is_empty() && !found.is_dir() => {
-            let complaint =
+            let user_error =
                 UserError::new(format!("--record {}: {} is not a folder", folder.display(), found.display()));
-            Err(complaint.help("name the folder that recordings go into").into())
+            Err(user_error.help("name the folder that recordings go into").into())
         }
         _ => Ok(()),
     }
@@ -187,8 +187,8 @@ fn check_folder(folder: &Path) -> Result<(), Failure> {
 /// Serves a board without a rig, which browsers make and calibrate.
 fn bringing_up(from: &SourceUrl, arguments: &Arguments) -> Result<Live, Failure> {
     if let Some(path) = &arguments.rules {
-        let complaint = UserError::new(format!("--rules {}: rules need a locator", path.display()));
-        return Err(complaint.help("name the locator, or omit --rules").into());
+        let user_error = UserError::new(format!("--rules {}: rules need a locator", path.display()));
+        return Err(user_error.help("name the locator, or omit --rules").into());
     }
     let live = Live::bringing_up(from.clone(), PathBuf::new())
         .map_err(|error| UserError::new(error).help("--from names the source"))?;
@@ -209,8 +209,8 @@ fn live(arguments: &Arguments) -> Result<Live, Failure> {
     let (locator, simulated) = match read {
         RigOrLocator::Locator(locator) => {
             if arguments.data.is_some() {
-                let complaint = UserError::for_path(path, "--data is for rigs, and this is a locator");
-                return Err(complaint.help("leave --data out").into());
+                let user_error = UserError::for_path(path, "--data is for rigs, and this is a locator");
+                return Err(user_error.help("leave --data out").into());
             }
             (*locator, None)
         }
@@ -310,8 +310,8 @@ fn calibration(arguments: &Arguments) -> Result<Option<CalibrationPlan>, Failure
         };
     };
     if !input::is_toml(path) {
-        let complaint = UserError::for_path(path, "--calibrate is for rigs, and this is a locator");
-        return Err(complaint.help("name the rig that is to be calibrated").into());
+        let user_error = UserError::for_path(path, "--calibrate is for rigs, and this is a locator");
+        return Err(user_error.help("name the rig that is to be calibrated").into());
     }
     let inputs = Inputs::new([path.as_path()]);
     Target::new(out, &inputs)?;
@@ -351,8 +351,9 @@ fn fitted(rig: &Rig, path: &Path, arguments: &Arguments) -> Result<Locator, Fail
     if let Estimator::Auto(Auto { only }) = &rig.estimator
         && only.is_empty()
     {
-        let complaint = UserError::for_path(path, "the estimator is `auto`, and its choice may take minutes");
-        return Err(complaint
+        let user_error =
+            UserError::for_path(path, "the estimator is `auto`, and its choice may take minutes");
+        return Err(user_error
             .help("name its candidates by `only`, or `palpate fit` it once and serve the locator")
             .into());
     }

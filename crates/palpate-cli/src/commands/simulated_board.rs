@@ -152,8 +152,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         FrameName::Binary => FrameForm::Binary { clock_ppm: arguments.clock_ppm },
         FrameName::Text if arguments.clock_ppm == 0.0 => FrameForm::Text,
         FrameName::Text => {
-            let complaint = UserError::new("--clock-ppm needs binary frames: text frames carry no time");
-            return Err(complaint.help("add --frames binary").into());
+            let user_error = UserError::new("--clock-ppm needs binary frames: text frames carry no time");
+            return Err(user_error.help("add --frames binary").into());
         }
     };
     let config = BoardConfig { rate_hz: arguments.rate, seed: arguments.seed, load_cell, frames };
@@ -215,8 +215,8 @@ fn load_cell(arguments: &Arguments, rig: &Rig) -> Result<Option<LoadCell>, Failu
     match rig.stage.as_ref().and_then(|stage| stage.load_cell.clone()) {
         Some(name) => Ok(Some(LoadCell { name, noise_n })),
         None => {
-            let complaint = "--load-cell needs the name of its values, `load_cell` of the rig's [stage]";
-            Err(UserError::for_path(&arguments.rig, complaint).into())
+            let message = "--load-cell needs the name of its values, `load_cell` of the rig's [stage]";
+            Err(UserError::for_path(&arguments.rig, message).into())
         }
     }
 }
@@ -225,8 +225,8 @@ fn load_cell(arguments: &Arguments, rig: &Rig) -> Result<Option<LoadCell>, Failu
 fn machine(arguments: &Arguments, rig: &Rig) -> Result<Option<ConnectedMachine>, Failure> {
     let Some(url) = &arguments.stage else { return Ok(None) };
     if !matches!(url, LinkUrl::Pty(_) | LinkUrl::Tcp(_)) {
-        let complaint = UserError::new(format!("--stage {url}: a machine answers what it is sent"));
-        return Err(complaint.help("give it a way back: pty, pty:PATH or tcp://:PORT").into());
+        let user_error = UserError::new(format!("--stage {url}: a machine answers what it is sent"));
+        return Err(user_error.help("give it a way back: pty, pty:PATH or tcp://:PORT").into());
     }
     let Some(stage) = &rig.stage else {
         return Err(UserError::for_path(&arguments.rig, "--stage needs the rig's section [stage]").into());

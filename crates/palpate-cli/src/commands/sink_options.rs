@@ -65,9 +65,9 @@ fn foxglove(_: SocketAddr) -> Result<OpenSink, Failure> {
 
 #[cfg(not(all(feature = "ros", feature = "foxglove")))]
 fn not_built(option: &str, feature: &str) -> Failure {
-    let complaint =
+    let user_error =
         UserError::new(format!("{option}: this command was built without its feature `{feature}`"));
-    complaint
+    user_error
         .help(format!("build it with: cargo install --path crates/palpate-cli --features {feature}"))
         .into()
 }

@@ -96,23 +96,23 @@ impl Arguments {
         if let Some(found) = OF_A_STUDY.into_iter().find(|name| out.join(name).exists())
             && self.earlier_run() == EarlierRun::Leave
         {
-            let complaint = match found {
+            let message = match found {
                 RESULTS_JSON => format!("{} contains the results of a finished run", out.display()),
                 SHARD_JSON => format!("{} contains a finished shard", out.display()),
                 table => format!("{} belongs to an unfinished run", out.join(table).display()),
             };
-            let complaint = UserError::new(complaint);
+            let user_error = UserError::new(message);
             return Err(match self.merge.is_empty() {
-                true => complaint
+                true => user_error
                     .help("--resume continues it, --overwrite deletes it, --out names another folder"),
-                false => complaint.help("--overwrite deletes it, --out names another folder"),
+                false => user_error.help("--overwrite deletes it, --out names another folder"),
             }
             .into());
         }
         if self.shard.is_some() && out.join(REPORT_HTML).exists() {
-            let complaint =
+            let user_error =
                 UserError::new(format!("{} contains a report, and a shard writes none", out.display()));
-            return Err(complaint.help("--out names another folder").into());
+            return Err(user_error.help("--out names another folder").into());
         }
         Ok(folder)
     }
@@ -162,7 +162,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 impl StudyRequest<'_> {
     fn prepare(&self, study: Study) -> Result<PreparedStudy, Failure> {
         let prepared = Observer::of_stages().watch(|watch| PreparedStudy::new(study, watch));
-        prepared.map_err(|error| complaint(&error, &self.name, &self.text))
+        prepared.map_err(|error| user_error(&error, &self.name, &self.text))
     }
 
     fn finish(
@@ -190,14 +190,14 @@ impl StudyRequest<'_> {
     }
 }
 
-fn complaint(error: &StudyRunError, name: &str, text: &str) -> Failure {
-    let complaint = UserError::new(error);
+fn user_error(error: &StudyRunError, name: &str, text: &str) -> Failure {
+    let user_error = UserError::new(error);
     match error {
         StudyRunError::Cancelled(_) => Failure::stopped(),
         StudyRunError::Design { span, error, .. } => {
-            complaint.help(super::design::help(error)).at_span(name, text, span.clone()).into()
+            user_error.help(super::design::help(error)).at_span(name, text, span.clone()).into()
         }
-        _ => complaint.into(),
+        _ => user_error.into(),
     }
 }
 

@@ -188,13 +188,13 @@ impl Stream<'_> {
             if !parser.progress().awaits_columns() && !parser.has_time() && self.arguments.rate.is_none() {
                 let column =
                     columns.time.as_ref().map_or("`time_s`".to_owned(), |time| time.column.to_string());
-                let complaint = UserError::new(format!("{} has no column {column}", self.lines.name()));
-                return Err(complaint.help("--rate gives the number of readings per second").into());
+                let user_error = UserError::new(format!("{} has no column {column}", self.lines.name()));
+                return Err(user_error.help("--rate gives the number of readings per second").into());
             }
         }
         if parsing.parser.progress().awaits_columns() && self.lines.is_whole() {
-            let complaint = UserError::new(format!("{} contains no reading", self.lines.name()));
-            return Err(complaint.help("it must begin with a header").into());
+            let user_error = UserError::new(format!("{} contains no reading", self.lines.name()));
+            return Err(user_error.help("it must begin with a header").into());
         }
         self.taring.as_ref().map_or(Ok(()), |taring| taring.finish(self.lines.name()))
     }

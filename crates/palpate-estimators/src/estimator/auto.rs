@@ -224,9 +224,9 @@ fn subtract_drift_with(
     memo: &FitMemo,
 ) -> Result<Option<Vec<f64>>, InfluenceFitError> {
     let mut spans: Option<Vec<f64>> = None;
-    for Split { training, held_out: judged, offsets, .. } in splits {
+    for Split { training, held_out, offsets, .. } in splits {
         let task = FitTask::new(memo.setup(), training).watch(watch).memo(memo);
-        *offsets = Influence::default().offset_course(task, judged)?;
+        *offsets = Influence::default().offset_course(task, held_out)?;
         for found in offsets.iter().map(OffsetCourse::spans) {
             let spans = spans.get_or_insert_with(|| vec![0.0; found.len()]);
             spans.iter_mut().zip(found).for_each(|(most, span)| *most = most.max(span));
@@ -287,10 +287,10 @@ fn choose(
             None
         }
     };
-    let (mut tried, mut left_out, mut last) = (Vec::new(), Vec::new(), None);
+    let (mut tried, mut omitted, mut last) = (Vec::new(), Vec::new(), None);
     if let Some(saturating) = candidates.iter().position(is_saturating) {
         match is_unsaturated(whole) {
-            Ok(true) => left_out.push((candidates.remove(saturating).name(), UNSATURATED.to_owned())),
+            Ok(true) => omitted.push((candidates.remove(saturating).name(), UNSATURATED.to_owned())),
             Err(error) if Cancelled::caused(&error) => return Err(stopped(None)),
             // Influence functions that cannot be learnt give the reason in their trial.
             Ok(false) | Err(_) => {}
@@ -312,10 +312,10 @@ fn choose(
                 if tried.is_empty() || matches!(why, FitError::Cancelled(_)) {
                     return Err(why);
                 }
-                left_out.push((name, NOT_IN_TIME.to_owned()));
+                omitted.push((name, NOT_IN_TIME.to_owned()));
             }
             Err(error) => {
-                left_out.push((name, error.to_string()));
+                omitted.push((name, error.to_string()));
                 last = Some(error);
             }
         }
@@ -327,12 +327,7 @@ fn choose(
     let first = tried.remove(chosen(&tried));
     let best = first.estimator.clone();
     tried.insert(0, first);
-    Ok(Choice {
-        best,
-        candidates: tried.into_iter().map(|trial| trial.errors).collect(),
-        omitted: left_out,
-        drift,
-    })
+    Ok(Choice { best, candidates: tried.into_iter().map(|trial| trial.errors).collect(), omitted, drift })
 }
 
 #[cfg(test)]

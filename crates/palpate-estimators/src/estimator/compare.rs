@@ -78,7 +78,7 @@ pub fn compare(
         }
         let go_on = |_| observe().is_ok();
         match splits.evaluate(&estimator, Watch::new(&go_on)) {
-            Ok(tried) => compared.comparisons.push(Comparison { estimator, timed: tried }),
+            Ok(timed) => compared.comparisons.push(Comparison { estimator, timed }),
             Err(error) if Cancelled::caused(&error) => return Err(Cancelled),
             Err(error) => compared.omitted.push((name, error.to_string())),
         }

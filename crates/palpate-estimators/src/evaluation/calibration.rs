@@ -29,8 +29,8 @@ use palpate_numerics::watch::Watch;
 /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
 /// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
 /// let calibration = Calibration::from_training(&setup, &Training::even(10).repeated(10))?;
-/// let judged = calibration.run(&Influence::default(), 0, Watch::NONE)?;
-/// let errors = judged.evaluation.summary(None).expect("399 contacts");
+/// let trial = calibration.run(&Influence::default(), 0, Watch::NONE)?;
+/// let errors = trial.evaluation.summary(None).expect("399 contacts");
 /// assert!(errors.median_m < mm(1.0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -189,8 +189,8 @@ impl Calibration {
         } else {
             simulate_at_watched(&self.training_setup, &self.presses, 1, seed, watch)?
         };
-        let judged = recording.subset(touched);
-        Ok(Split { training, held_out: judged, offsets: None, origin: SplitOrigin::Calibration })
+        let held_out = recording.subset(touched);
+        Ok(Split { training, held_out, offsets: None, origin: SplitOrigin::Calibration })
     }
 
     fn simulate_in_time(&self, seed: u64, watch: Watch) -> Result<Split, SimulateError> {
@@ -199,9 +199,10 @@ impl Calibration {
         let zero = self.training_setup.recording_columns().zero;
         let training = bench.record(&presses, self.placement_sd_m, watch)?.subtract_zero(zero)?;
         bench.pause();
-        let judged = bench.record(&Press::from_rows(&self.contacts()?), None, watch)?.subtract_zero(zero)?;
-        let judged = judged.touched().into_owned();
-        Ok(Split { training, held_out: judged, offsets: None, origin: SplitOrigin::Calibration })
+        let held_out =
+            bench.record(&Press::from_rows(&self.contacts()?), None, watch)?.subtract_zero(zero)?;
+        let held_out = held_out.touched().into_owned();
+        Ok(Split { training, held_out, offsets: None, origin: SplitOrigin::Calibration })
     }
 
     /// Simulates `count` consecutive seeds.
@@ -243,10 +244,10 @@ impl Calibration {
         watch: Watch,
         fit: impl FnOnce(FitTask) -> Result<Fitted<M>, E>,
     ) -> Result<CalibrationTrial<M>, EvaluationError<E>> {
-        let Split { training, held_out: judged, .. } = self.simulate_watched(seed, watch)?;
+        let Split { training, held_out, .. } = self.simulate_watched(seed, watch)?;
         let task = FitTask::new(&self.known_setup, &training).seed(seed).watch(watch);
         let locator = fit(task).map_err(EvaluationError::Fit)?;
-        Ok(CalibrationTrial { seed, evaluation: Evaluation::new(&locator, &judged)?, locator })
+        Ok(CalibrationTrial { seed, evaluation: Evaluation::new(&locator, &held_out)?, locator })
     }
 
     /// Runs rising seeds; without faults the estimator fits equal presses together.
@@ -263,12 +264,12 @@ impl Calibration {
         let (Some(&seed), true) = (seeds.first(), self.is_faultless()) else {
             return seeds.into_iter().map(|seed| self.run(estimator, seed, watch)).collect();
         };
-        let Split { training, held_out: judged, .. } = self.simulate_watched(seed, watch)?;
+        let Split { training, held_out, .. } = self.simulate_watched(seed, watch)?;
         let mut queue = SeedList::new(seeds);
         let task = FitTask::new(&self.known_setup, &training).seed(seed).watch(watch);
         estimator.fit_many(task, &mut queue).map_err(EvaluationError::Fit)?;
         let judge = |(seed, locator)| {
-            Ok(CalibrationTrial { seed, evaluation: Evaluation::new(&locator, &judged)?, locator })
+            Ok(CalibrationTrial { seed, evaluation: Evaluation::new(&locator, &held_out)?, locator })
         };
         queue.into_results().into_iter().map(judge).collect()
     }

@@ -234,7 +234,7 @@ struct SensorRows<'a> {
 }
 
 struct Posterior<'s, 'a> {
-    presses: &'s SensorRows<'a>,
+    rows: &'s SensorRows<'a>,
     hyper: Hyperparameters,
     cholesky: Cholesky,
     weights: Array1<f64>,
@@ -303,17 +303,17 @@ impl<'a> SensorRows<'a> {
     pub fn posterior(&self, hyper: Hyperparameters) -> Result<Posterior<'_, 'a>, NotPositiveDefinite> {
         let cholesky = Cholesky::factor(self.covariance(&hyper))?;
         let weights = cholesky.solve(&self.residual);
-        Ok(Posterior { presses: self, hyper, cholesky, weights })
+        Ok(Posterior { rows: self, hyper, cholesky, weights })
     }
 }
 
 impl Posterior<'_, '_> {
     pub fn offset(&self) -> f64 {
-        self.presses.offset_variance(&self.hyper) * self.weights.sum()
+        self.rows.offset_variance(&self.hyper) * self.weights.sum()
     }
 
     fn with_presses(&self, at: Parts, remainders: &ArrayView1<f64>) -> Array1<f64> {
-        let SensorRows { prior, parts, force_n, .. } = self.presses;
+        let SensorRows { prior, parts, force_n, .. } = self.rows;
         let presses = parts.iter().zip(force_n).zip(remainders);
         let covariance = |((press, force_n), remainder): ((&Parts, &f64), &f64)| {
             force_n * prior.covariance(&self.hyper, at, *press, *remainder)
@@ -322,16 +322,16 @@ impl Posterior<'_, '_> {
     }
 
     pub fn mean(&self, at: Parts, remainders: &ArrayView1<f64>) -> f64 {
-        self.presses.prior.mean(at) + self.with_presses(at, remainders).dot(&self.weights)
+        self.rows.prior.mean(at) + self.with_presses(at, remainders).dot(&self.weights)
     }
 
     /// Posterior variance of influence plus offset/mean force; `own` is the remainder's variance.
     pub fn variance(&self, at: Parts, remainders: &ArrayView1<f64>, own: f64) -> f64 {
-        let force_n = self.presses.mean_force_n;
-        let offset = self.presses.offset_variance(&self.hyper);
+        let force_n = self.rows.mean_force_n;
+        let offset = self.rows.offset_variance(&self.hyper);
         let covariance = self.with_presses(at, remainders) + offset / force_n;
         let explained = self.cholesky.solve_lower(&covariance);
-        let before = self.presses.prior.covariance(&self.hyper, at, at, own);
+        let before = self.rows.prior.covariance(&self.hyper, at, at, own);
         (before + offset / (force_n * force_n) - explained.dot(&explained)).max(0.0)
     }
 }

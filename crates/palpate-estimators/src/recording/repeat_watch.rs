@@ -14,7 +14,7 @@ const PAIRS_EACH: u64 = 32;
 /// let values: Vec<[f64; 2]> = (0..100_u32).map(|i| [f64::from(i * 7919 % 97), f64::from(i * 104_729 % 89)]).collect();
 /// let stream = values.iter().flat_map(|value| [value; 4]);
 /// let repeats = stream.filter(|reading| watch.add(*reading, true)).count();
-/// // The first test follows 32 pairs, with 8 readings and 24 repeats; all repeats after it are found.
+/// // The first test follows 32 pairs, with 8 readings and 24 repeats; all repeats after it are detected.
 /// assert!(watch.is_sample_and_hold() && (270..=300).contains(&repeats), "{repeats}");
 /// ```
 #[derive(Clone, Debug)]

@@ -13,7 +13,7 @@ pub fn run(outlet: &InputSender, commands: &Receiver<Vec<u8>>, path: &Path, baud
     let opened = Arrival::Joined(format!("{} at {baud} baud", path.display()));
     port::run(outlet, commands, &opened, || {
         let port = serialport::new(path.to_string_lossy(), baud).timeout(LOOK).open();
-        let stream = port.map_err(|error| complaint(path, error))?;
+        let stream = port.map_err(|error| open_error(path, error))?;
         Ok(SerialStream(Stream { stream, end: "the port is gone" }))
     });
 }
@@ -51,7 +51,7 @@ impl Port for SerialStream {
     }
 }
 
-fn complaint(path: &Path, error: serialport::Error) -> io::Error {
+fn open_error(path: &Path, error: serialport::Error) -> io::Error {
     // On Unix systems this kind means that the port is locked.
     let is_busy = cfg!(unix) && error.kind == serialport::ErrorKind::NoDevice;
     let error = io::Error::from(error);

@@ -63,7 +63,7 @@ fn changed_rig(
     Ok((input::parse_rig(path, &written)?, written))
 }
 
-fn design_complaint(error: &(dyn std::error::Error + 'static), rig: &Path, help: &str) -> Failure {
+fn design_error(error: &(dyn std::error::Error + 'static), rig: &Path, help: &str) -> Failure {
     if Cancelled::caused(error) {
         Failure::stopped()
     } else {

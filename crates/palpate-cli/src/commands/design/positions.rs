@@ -1,7 +1,7 @@
 //! `palpate design positions`: training positions, compared with even ones; and the next press of a
 //! recording.
 
-use super::{changed_rig, design_complaint, print_files, to_micrometre, toml_position};
+use super::{changed_rig, design_error, print_files, to_micrometre, toml_position};
 use crate::failure::Failure;
 use crate::input::{self, RecordingFiles};
 use crate::json::object;
@@ -96,9 +96,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(recording) = files.read(&rig.setup)? {
         return advise(arguments, &rig, &recording);
     }
-    let complain = |error: PositionError| complaint(&error, &arguments.rig);
-    let problem = PositionProblem::new(&rig.setup, &what_to_design(arguments, &rig)).map_err(complain)?;
-    let placed = Observer::of_stages().watch(|watch| problem.all(watch)).map_err(complain)?;
+    let to_failure = |error: PositionError| user_error(&error, &arguments.rig);
+    let problem = PositionProblem::new(&rig.setup, &what_to_design(arguments, &rig)).map_err(to_failure)?;
+    let placed = Observer::of_stages().watch(|watch| problem.all(watch)).map_err(to_failure)?;
     let outcome = Outcome { rig: &arguments.rig, estimator: rig.estimator.kind(), problem: &problem, placed };
     if let (Some(target), Some(best)) = (&out, best_placed(&outcome.placed)) {
         let (_, written) = changed_rig(target.path(), &text, "positions", |rig| {
@@ -150,8 +150,8 @@ fn percent(text: &str) -> Result<f64, String> {
     }
 }
 
-fn complaint(error: &PositionError, rig: &Path) -> Failure {
-    design_complaint(error, rig, help(error))
+fn user_error(error: &PositionError, rig: &Path) -> Failure {
+    design_error(error, rig, help(error))
 }
 
 fn help(error: &PositionError) -> &'static str {
@@ -306,7 +306,7 @@ fn advise(arguments: &Arguments, rig: &Rig, recording: &Recording) -> Result<(),
     }
     let advice = Observer::of_stages()
         .watch(|watch| next_press(&rig.setup, recording, &design, watch))
-        .map_err(|error| complaint(&error, &arguments.rig))?;
+        .map_err(|error| user_error(&error, &arguments.rig))?;
     if arguments.json {
         return output::print_json(&advice_to_json(arguments, &advice));
     }

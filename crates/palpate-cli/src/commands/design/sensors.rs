@@ -1,6 +1,6 @@
 //! `palpate design sensors`: kinds and positions of sensors, compared with the even layout.
 
-use super::{changed_rig, design_complaint, print_files, to_micrometre, toml_position};
+use super::{changed_rig, design_error, print_files, to_micrometre, toml_position};
 use crate::cost::MemoryOption;
 use crate::failure::{Failure, UserError};
 use crate::input;
@@ -104,13 +104,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let report = arguments.report.as_ref();
     let report = report.map(|folder| TargetFolder::for_report(folder, &inputs)).transpose()?;
     let (setup, design) = what_to_design(arguments, &rig)?;
-    let complain = |error: DesignError| complaint(&error, &arguments.rig);
-    let cost = SensorProblem::estimated_cost(&setup, &design).map_err(complain)?;
+    let to_failure = |error: DesignError| user_error(&error, &arguments.rig);
+    let cost = SensorProblem::estimated_cost(&setup, &design).map_err(to_failure)?;
     let what = format!("the design with {} candidate sensors", format_count(cost.candidates as u64));
     let remedy = "set `sites` or the contacts' `every` wider apart";
     arguments.memory.check_work(&what, [cost.seconds; 2], cost.memory_bytes, remedy)?;
     let observer = Observer::of_stages();
-    let problem = observer.watch(|watch| SensorProblem::new(&setup, &design, watch)).map_err(complain)?;
+    let problem = observer.watch(|watch| SensorProblem::new(&setup, &design, watch)).map_err(to_failure)?;
     let outcome = observer.watch(|watch| outcome(arguments, &rig, &problem, watch))?;
     drop(observer);
     if let (Some(target), Some(best)) = (&out, best_design(&outcome.designed)) {
@@ -139,7 +139,7 @@ fn what_to_design(arguments: &Arguments, rig: &Rig) -> Result<(Setup, SensorDesi
     let setup = setup.map_err(|error| UserError::for_path(&arguments.rig, error))?;
     let mut design = match &rig.design {
         Some(design) => design.clone(),
-        None => SensorDesign::for_setup(&rig.setup).map_err(|error| complaint(&error, &arguments.rig))?,
+        None => SensorDesign::for_setup(&rig.setup).map_err(|error| user_error(&error, &arguments.rig))?,
     };
     if arguments.unknown_force {
         design = design.unknown_force();
@@ -149,7 +149,7 @@ fn what_to_design(arguments: &Arguments, rig: &Rig) -> Result<(Setup, SensorDesi
     }
     if let Some(count) = arguments.add {
         let adding = design.adding(usize::from(count), rig.setup.layout());
-        design = adding.map_err(|error| complaint(&error, &arguments.rig))?;
+        design = adding.map_err(|error| user_error(&error, &arguments.rig))?;
         let dead = rig.setup.layout().len() - design.fixed.len();
         if dead > 0 {
             remark!("palpate: {dead} existing sensors are dead, and are not kept");
@@ -164,11 +164,11 @@ fn outcome<'a>(
     problem: &'a SensorProblem<'a>,
     watch: Watch,
 ) -> Result<Outcome<'a>, Failure> {
-    let complain = |error: DesignError| complaint(&error, &arguments.rig);
-    let designed = problem.all(arguments.seed, watch).map_err(complain)?;
+    let to_failure = |error: DesignError| user_error(&error, &arguments.rig);
+    let designed = problem.all(arguments.seed, watch).map_err(to_failure)?;
     let counts = match &arguments.counts {
         None => Vec::new(),
-        Some(range) => problem.counts(range.clone(), arguments.seed, watch).map_err(complain)?,
+        Some(range) => problem.counts(range.clone(), arguments.seed, watch).map_err(to_failure)?,
     };
     let calibrations = arguments.verify.unwrap_or(if arguments.report.is_some() { 3 } else { 0 });
     let mut verified = Vec::new();
@@ -181,13 +181,13 @@ fn outcome<'a>(
                 arguments.seed,
                 watch,
             );
-            let complain = |error: EvaluationError<FitError>| match Failure::from_error(&error) {
+            let to_failure = |error: EvaluationError<FitError>| match Failure::from_error(&error) {
                 Failure::BadInput(_) => {
                     UserError::new(format!("{}: cannot verify: {error}", arguments.rig.display())).into()
                 }
                 stopped => stopped,
             };
-            verified.push((designed.method, verification.map_err(complain)?));
+            verified.push((designed.method, verification.map_err(to_failure)?));
         }
     }
     Ok(Outcome { rig: &arguments.rig, problem, designed, verified, counts, seed: arguments.seed })
@@ -206,8 +206,8 @@ fn write_report(outcome: &Outcome, setup: &Setup, folder: &TargetFolder) -> Resu
     folder.write_report(sensor_design_report(&report))
 }
 
-fn complaint(error: &DesignError, rig: &Path) -> Failure {
-    design_complaint(error, rig, help(error))
+fn user_error(error: &DesignError, rig: &Path) -> Failure {
+    design_error(error, rig, help(error))
 }
 
 const MOST_COUNT: usize = 200;

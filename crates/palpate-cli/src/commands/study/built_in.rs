@@ -62,13 +62,13 @@ pub fn elliott(arguments: &Arguments) -> Result<(), Failure> {
 fn folder(arguments: &Arguments, study: &str) -> Result<TargetFolder, Failure> {
     let in_shards = [(arguments.shard.is_some(), "--shard"), (!arguments.merge.is_empty(), "--merge")];
     if let Some((_, option)) = in_shards.into_iter().find(|(asked, _)| *asked) {
-        let complaint = UserError::new(format!("{option}: the study `{study}` is not run in shards"));
-        return Err(complaint.help("run it whole: it takes minutes").into());
+        let user_error = UserError::new(format!("{option}: the study `{study}` is not run in shards"));
+        return Err(user_error.help("run it whole: it takes minutes").into());
     }
     if arguments.earlier_run() == EarlierRun::Resume {
-        let complaint =
+        let user_error =
             UserError::new(format!("--resume: the study `{study}` keeps no networks to continue from"));
-        return Err(complaint.help("--overwrite deletes an earlier run, --out names another folder").into());
+        return Err(user_error.help("--overwrite deletes an earlier run, --out names another folder").into());
     }
     arguments.folder(study)
 }

@@ -68,12 +68,12 @@ pub fn read(out: &TargetFolder, tables: &StudyTables) -> Result<Checkpoint, Fail
     let texts = read_texts(out.path())?;
     let checkpoint = tables.read(&texts).map_err(|error| {
         let name = out.path().join(error.table().file_name()).display().to_string();
-        let complaint = UserError::new(format!("{name}: {error}"));
+        let user_error = UserError::new(format!("{name}: {error}"));
         match &error {
             CheckpointError::Heading { .. } => {
-                complaint.help("--overwrite starts again, --out names another folder")
+                user_error.help("--overwrite starts again, --out names another folder")
             }
-            CheckpointError::Row { .. } => at_row(complaint, &name, &texts, &error),
+            CheckpointError::Row { .. } => at_row(user_error, &name, &texts, &error),
         }
     })?;
     for table in &checkpoint.cut_off {
@@ -89,11 +89,11 @@ pub fn read(out: &TargetFolder, tables: &StudyTables) -> Result<Checkpoint, Fail
     Ok(checkpoint)
 }
 
-pub fn at_row(complaint: UserError, name: &str, texts: &FitRows, error: &CheckpointError) -> UserError {
-    let CheckpointError::Row { table, line, .. } = error else { return complaint };
+pub fn at_row(user_error: UserError, name: &str, texts: &FitRows, error: &CheckpointError) -> UserError {
+    let CheckpointError::Row { table, line, .. } = error else { return user_error };
     let text = table.text(texts);
     let row = text.lines().nth(line - 1).unwrap_or_default();
-    complaint.at_line(name, *line, row, 0..row.find(',').unwrap_or(row.len()))
+    user_error.at_line(name, *line, row, 0..row.find(',').unwrap_or(row.len()))
 }
 
 /// Reports surplus fits of an earlier run, which the results exclude.

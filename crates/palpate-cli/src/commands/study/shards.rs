@@ -45,7 +45,7 @@ pub fn merge(asked: &StudyRequest, study: Study) -> Result<(), Failure> {
     let out = asked.arguments.folder(&study.name)?;
     let shards = folders.iter().map(|folder| read_tables(folder)).collect::<Result<Vec<_>, _>>()?;
     let prepared = asked.prepare(study)?;
-    let merged = prepared.merge(&shards).map_err(|error| complaint(&error, &shards))?;
+    let merged = prepared.merge(&shards).map_err(|error| user_error(&error, &shards))?;
     let facts = folders.iter().map(|folder| read_facts(folder)).collect::<Result<Vec<_>, _>>()?;
     let facts = RunFacts::of_shards(&facts).ok_or_else(|| UserError::new(AssemblyError::Nothing))?;
     let facts = RunFacts { seeds: merged.seeds, ..facts };
@@ -57,8 +57,8 @@ pub fn merge(asked: &StudyRequest, study: Study) -> Result<(), Failure> {
 fn read_tables(folder: &Path) -> Result<ShardTables, Failure> {
     let networks = folder.join(NETWORKS_CSV);
     if !networks.exists() {
-        let complaint = UserError::new(format!("{}: {NETWORKS_CSV} is missing", folder.display()));
-        return Err(complaint.help("--merge takes the folders that --shard K/N wrote").into());
+        let user_error = UserError::new(format!("{}: {NETWORKS_CSV} is missing", folder.display()));
+        return Err(user_error.help("--merge takes the folders that --shard K/N wrote").into());
     }
     Ok(ShardTables { place: folder.display().to_string(), texts: fits::read_texts(folder)? })
 }
@@ -66,8 +66,8 @@ fn read_tables(folder: &Path) -> Result<ShardTables, Failure> {
 fn read_facts(folder: &Path) -> Result<RunFacts, Failure> {
     let path = folder.join(SHARD_JSON);
     if !path.exists() {
-        let complaint = UserError::new(format!("{}: {SHARD_JSON} is missing", folder.display()));
-        return Err(complaint.help("run the shard again with --resume, which writes it").into());
+        let user_error = UserError::new(format!("{}: {SHARD_JSON} is missing", folder.display()));
+        return Err(user_error.help("run the shard again with --resume, which writes it").into());
     }
     let file: Result<ShardFile, _> = serde_json::from_str(&input::read_text(&path)?);
     let file = file.map_err(|error| {
@@ -76,30 +76,32 @@ fn read_facts(folder: &Path) -> Result<RunFacts, Failure> {
     Ok(file.run)
 }
 
-fn complaint(error: &AssemblyError, shards: &[ShardTables]) -> UserError {
-    let complaint = UserError::new(error);
+fn user_error(error: &AssemblyError, shards: &[ShardTables]) -> UserError {
+    let user_error = UserError::new(error);
     match error {
         AssemblyError::Table { place, error: row } => match row {
-            CheckpointError::Heading { .. } => complaint
+            CheckpointError::Heading { .. } => user_error
                 .help("name the study file that the shard is of, or run the shard again with --overwrite"),
             CheckpointError::Row { table, .. } => {
                 let name = Path::new(place).join(table.file_name()).display().to_string();
-                let Some(shard) = shards.iter().find(|shard| shard.place == *place) else { return complaint };
-                fits::at_row(complaint, &name, &shard.texts, row)
+                let Some(shard) = shards.iter().find(|shard| shard.place == *place) else {
+                    return user_error;
+                };
+                fits::at_row(user_error, &name, &shard.texts, row)
             }
         },
         AssemblyError::Whole { .. } | AssemblyError::Nothing => {
-            complaint.help("--merge takes the folders that --shard K/N wrote")
+            user_error.help("--merge takes the folders that --shard K/N wrote")
         }
-        AssemblyError::Split { .. } => complaint.help("leave out those of the other split"),
-        AssemblyError::TwoOfAShard { .. } => complaint.help("name one of the two"),
+        AssemblyError::Split { .. } => user_error.help("leave out those of the other split"),
+        AssemblyError::TwoOfAShard { .. } => user_error.help("name one of the two"),
         AssemblyError::Unfinished { place, shard, .. } => {
-            complaint.help(format!("--shard {shard} --out {place} --resume continues from them"))
+            user_error.help(format!("--shard {shard} --out {place} --resume continues from them"))
         }
         AssemblyError::MissingShards { missing, of } => {
             let first = missing.first().copied().unwrap_or(1);
-            complaint.help(format!("name their folders too; --shard {first}/{of} runs the first of them"))
+            user_error.help(format!("name their folders too; --shard {first}/{of} runs the first of them"))
         }
-        AssemblyError::TwoOfAFit { .. } | AssemblyError::MissingFits { .. } => complaint,
+        AssemblyError::TwoOfAFit { .. } | AssemblyError::MissingFits { .. } => user_error,
     }
 }

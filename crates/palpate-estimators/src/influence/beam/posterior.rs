@@ -126,10 +126,11 @@ fn write_competing(search: &Search, minima: &[Minimum], misfits: &[f64; COARSE],
     let shares = shares(search, minima);
     let x_95_m = interval(search, minima, &shares, misfits);
     let mut ranks: [usize; MOST_MINIMA] = std::array::from_fn(|i| i);
+    let ranks = &mut ranks[..minima.len()];
     ranks.sort_by(|a, b| shares[*b].total_cmp(&shares[*a]));
     estimate.contact = contact(search, &minima[ranks[0]], x_95_m);
     estimate.status = Status::Located;
-    for i in ranks[1..minima.len()].iter().copied().filter(|i| shares[*i] >= OTHER_PLACE) {
+    for i in ranks[1..].iter().copied().filter(|i| shares[*i] >= OTHER_PLACE) {
         let alone = single_interval(&minima[i], search.table.length_m);
         let mode = Mode { contact: contact(search, &minima[i], alone), probability: shares[i] };
         estimate.modes.push(mode);
@@ -159,7 +160,7 @@ fn shares(search: &Search, minima: &[Minimum]) -> [f64; MOST_MINIMA] {
     }
     let length_m = search.table.length_m;
     let cost = |minimum: &Minimum| minimum.misfit + search.log_determinant(minimum.x_m, minimum.force_n);
-    let best = cost(&minima[0]);
+    let best = minima.iter().map(cost).fold(f64::INFINITY, f64::min);
     for (share, minimum) in shares.iter_mut().zip(minima) {
         let sd_m = minimum.covariance[0].sqrt().min(length_m);
         *share = (0.5 * (best - cost(minimum))).exp() * sd_m * mass(minimum.x_m, sd_m, length_m);
