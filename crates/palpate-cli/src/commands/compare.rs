@@ -101,7 +101,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "length_mm": rig.setup.surface().extent().length_m() * 1e3,
             "tolerance_mm": arguments.tolerance * 1e3,
             "estimators": estimators.collect::<Vec<_>>(),
-            "omitted": omitted.iter().map(|(name, why)| object! { "name": name, "why": why }).collect::<Vec<_>>(),
+            "left_out": omitted.iter().map(|(name, why)| object! { "name": name, "why": why }).collect::<Vec<_>>(),
         });
     }
     output::print_line(format!("{}: {how}; {readings} readings\n", arguments.rig.display()))?;
