@@ -1,6 +1,6 @@
 //! Rest after a touch: steady readings that are small compared with it.
 
-use super::{LET_GO, next_in_row};
+use super::{LET_GO, run_length};
 use crate::Status;
 
 const AT_REST: u32 = 2 * LET_GO;
@@ -140,7 +140,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> RestWatch<B> {
         let by_noise = (2.0 * channels + 8.0) * (1.0 + 1.0 / f64::from(self.rested.max(1)));
         let stays =
             self.distance(reading, self.rest.as_ref()) <= by_noise.max(CHANGE * CHANGE * self.touch_size);
-        self.rested = next_in_row(self.rested, self.rested > 0 && stays).max(1);
+        self.rested = run_length(self.rested, self.rested > 0 && stays).max(1);
         let share = 1.0 / f64::from(self.rested);
         for (rest, value) in self.rest.as_mut().iter_mut().zip(reading) {
             *rest += share * (value - *rest);
