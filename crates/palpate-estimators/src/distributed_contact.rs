@@ -7,10 +7,9 @@
 //!
 //! Differences in place of derivatives keep the error rate, as residuals are orthogonal to f and f′.
 
-use crate::status::SPREAD_RATE;
+use crate::status::{CriticalValues, SPREAD_RATE};
+use palpate_numerics::push_rest;
 use palpate_numerics::small::dot;
-use palpate_numerics::{chi_squared_critical_value, push_rest};
-use std::sync::OnceLock;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BoundedContact {
@@ -97,12 +96,10 @@ pub(crate) fn distributed_contact_score(
 
 /// Critical value at [`SPREAD_RATE`].
 pub(crate) fn distributed_contact_bound(dimensions: usize) -> f64 {
-    static KNOWN: [OnceLock<f64>; 2] = [const { OnceLock::new() }; 2];
-    if dimensions == 1 {
-        // One-sided test.
-        return *KNOWN[0].get_or_init(|| chi_squared_critical_value(2.0 * SPREAD_RATE, 1));
-    }
-    *KNOWN[1].get_or_init(|| chi_squared_critical_value(SPREAD_RATE, 3))
+    // One-sided test on a line.
+    static LINE: CriticalValues = CriticalValues::new(2.0 * SPREAD_RATE);
+    static PLANE: CriticalValues = CriticalValues::new(SPREAD_RATE);
+    if dimensions == 1 { LINE.at(1) } else { PLANE.at(3) }
 }
 
 fn combined(parts: &[(f64, Vec<f64>)]) -> Vec<f64> {

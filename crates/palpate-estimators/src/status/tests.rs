@@ -1,5 +1,6 @@
 //! Measured false-alarm rates of `no_contact` and `outside_model`.
 
+use super::rule::{detection_cost, noise_bound};
 use super::*;
 use crate::closed_form::ClosedForm;
 use crate::digit::{DigitEstimator, DigitTheory};
@@ -367,7 +368,7 @@ fn undetermined_counts(locator: &Locator, bench: &Example, force_n: f64, contact
             extent.width_m().map_or(1.0, |width_m| share(uncertainty.y_95_m, width_m)),
         ];
         let is_told = matches!(estimate.status, Status::Located | Status::Ambiguous);
-        let is_open = shares.iter().all(|share| *share >= PLACE_LEFT_OPEN);
+        let is_open = shares.iter().all(|share| *share >= UNDETERMINED_SHARE);
         assert!(
             !(is_open && estimate.status == Status::Located),
             "{}: located anywhere: {estimate:?}",

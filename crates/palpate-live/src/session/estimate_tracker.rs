@@ -1,8 +1,8 @@
-use palpate_core::{ContactEstimate, Estimate, Status};
+use palpate_core::{Estimate, Status};
 use palpate_estimators::estimator::{
     Locator, NotTrackable, Track, TrackedContact, Tracker, TrackerConfig, Tracking,
 };
-use palpate_estimators::status::PLACE_LEFT_OPEN;
+use palpate_estimators::status::is_undetermined;
 use palpate_mechanics::surface::Extent;
 
 /// Tracker that returns estimates.
@@ -75,7 +75,7 @@ impl EstimateTracker {
         };
         let status = if is_outside {
             Status::OutsideModel
-        } else if self.is_undetermined(&first) {
+        } else if first.uncertainty.is_some_and(|uncertainty| is_undetermined(&uncertainty, self.extent)) {
             Status::Ambiguous
         } else {
             Status::Located
@@ -86,12 +86,5 @@ impl EstimateTracker {
             estimate.further.push(further);
         }
         estimate
-    }
-
-    fn is_undetermined(&self, contact: &ContactEstimate) -> bool {
-        let Some(uncertainty) = &contact.uncertainty else { return false };
-        let is_open = |(low_m, high_m): (f64, f64), side_m: f64| high_m - low_m >= PLACE_LEFT_OPEN * side_m;
-        is_open(uncertainty.x_95_m, self.extent.length_m())
-            && self.extent.width_m().is_none_or(|width_m| is_open(uncertainty.y_95_m, width_m))
     }
 }
