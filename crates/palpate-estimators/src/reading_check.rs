@@ -11,7 +11,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::digit::{DigitEstimator, DigitLocator};
-use crate::fit::{CheckEstimate, Fit, FitTask, Locate, LocatorFault};
+use crate::fit::{CheckEstimate, Fit, FitTask, Locate, LocatorFault, NoCheck};
 use crate::influence::{Influence, InfluenceLocator, InfluenceSource};
 use crate::recording::Recording;
 use crate::setup::Setup;
@@ -21,20 +21,31 @@ use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_numerics::watch::Cancelled;
+use palpate_numerics::{clamped_interval, extend_to};
 use std::borrow::Cow;
+use std::error::Error;
 
 /// Check of estimates; see [the module](self).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(into = "CheckData", try_from = "CheckData")]
 pub struct ReadingCheck {
-    by: Forward,
+    model: ForwardModel,
     own_intervals: Option<OwnIntervals>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-enum Forward {
+enum ForwardModel {
     Influence(InfluenceLocator),
     Digit(DigitLocator),
+}
+
+impl ForwardModel {
+    fn locator(&self) -> &dyn Locate<Check = NoCheck> {
+        match self {
+            Self::Influence(influence) => influence,
+            Self::Digit(digit) => digit,
+        }
+    }
 }
 
 /// Ratio of mean lengths for own intervals.
@@ -58,10 +69,10 @@ struct CheckData {
 }
 
 impl From<ReadingCheck> for CheckData {
-    fn from(ReadingCheck { by, own_intervals }: ReadingCheck) -> Self {
-        let (influence, digit) = match by {
-            Forward::Influence(influence) => (Some(influence), None),
-            Forward::Digit(digit) => (None, Some(digit)),
+    fn from(ReadingCheck { model, own_intervals }: ReadingCheck) -> Self {
+        let (influence, digit) = match model {
+            ForwardModel::Influence(influence) => (Some(influence), None),
+            ForwardModel::Digit(digit) => (None, Some(digit)),
         };
         Self { influence, digit, own_intervals }
     }
@@ -71,12 +82,12 @@ impl TryFrom<CheckData> for ReadingCheck {
     type Error = &'static str;
 
     fn try_from(CheckData { influence, digit, own_intervals }: CheckData) -> Result<Self, Self::Error> {
-        let by = match (influence, digit) {
-            (Some(influence), None) => Forward::Influence(influence),
-            (None, Some(digit)) => Forward::Digit(digit),
+        let model = match (influence, digit) {
+            (Some(influence), None) => ForwardModel::Influence(influence),
+            (None, Some(digit)) => ForwardModel::Digit(digit),
             _ => return Err("a check has either `influence` or `digit`"),
         };
-        Ok(Self { by, own_intervals })
+        Ok(Self { model, own_intervals })
     }
 }
 
@@ -91,9 +102,10 @@ impl ReadingCheck {
     pub fn fit(task: FitTask) -> Result<Option<Self>, Cancelled> {
         let recording = Self::thinned(task.recording);
         let task = FitTask { recording: &recording, ..task };
+        let with_model = |model| Self { model, own_intervals: None };
         if let SurfaceSpec::Digit(_) = task.setup.surface() {
-            let digit = DigitEstimator::default().fit_method(task).ok();
-            return Ok(digit.map(|digit| Self { by: Forward::Digit(digit), own_intervals: None }));
+            let digit = unless_cancelled(DigitEstimator::default().fit_method(task))?;
+            return Ok(digit.map(|digit| with_model(ForwardModel::Digit(digit))));
         }
         let mut methods = vec![Influence::default()];
         if task.setup.surface().model().is_some() {
@@ -101,10 +113,8 @@ impl ReadingCheck {
             methods.push(Influence { source: InfluenceSource::Mechanics, ..Influence::default() });
         }
         for method in methods {
-            match method.fit_method(task) {
-                Ok(fitted) => return Ok(Some(Self { by: Forward::Influence(fitted), own_intervals: None })),
-                Err(error) if Cancelled::caused(&error) => return Err(Cancelled),
-                Err(_) => {}
+            if let Some(influence) = unless_cancelled(method.fit_method(task))? {
+                return Ok(Some(with_model(ForwardModel::Influence(influence))));
             }
         }
         Ok(None)
@@ -149,18 +159,12 @@ impl ReadingCheck {
 
     /// False-alarm rate; `None` for a check without detection.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
-        match &self.by {
-            Forward::Influence(influence) => influence.false_alarm_rate(),
-            Forward::Digit(digit) => Some(digit.false_alarm_rate),
-        }
+        self.model.locator().false_alarm_rate()
     }
 
     /// Learnt offsets in SI units.
     pub fn offsets(&self) -> Option<Vec<f64>> {
-        match &self.by {
-            Forward::Influence(influence) => influence.offsets(),
-            Forward::Digit(digit) => digit.offsets(),
-        }
+        self.model.locator().offsets()
     }
 
     /// True where own intervals are kept.
@@ -170,9 +174,9 @@ impl ReadingCheck {
 
     /// Name of the forward model.
     pub fn in_words(&self) -> &'static str {
-        match &self.by {
-            Forward::Influence(_) => "influence functions of the same recording",
-            Forward::Digit(_) => "the equations of a bending finger",
+        match &self.model {
+            ForwardModel::Influence(_) => "influence functions of the same recording",
+            ForwardModel::Digit(_) => "the equations of a bending finger",
         }
     }
 }
@@ -183,92 +187,102 @@ impl CheckEstimate for ReadingCheck {
     }
 
     fn noise_sd(&self) -> Option<Vec<Option<f64>>> {
-        match &self.by {
-            Forward::Influence(influence) => influence.noise_sd(),
-            Forward::Digit(digit) => digit.noise_sd(),
-        }
+        self.model.locator().noise_sd()
     }
 
     fn checked(&self, reading: &[f64], estimate: Estimate, extent: Extent) -> Estimate {
-        let explained = match &self.by {
-            Forward::Influence(influence) => influence.locate(reading),
-            Forward::Digit(digit) => digit.locate(reading),
-        };
+        let explained = self.model.locator().locate(reading);
         self.combine_estimates(explained, estimate, extent)
     }
 
     fn check_batch(&self, readings: &[f64], channels: usize, estimates: &mut [Estimate], extent: Extent) {
         let mut explained = vec![NO_CONTACT; estimates.len()];
-        match &self.by {
-            Forward::Influence(influence) => influence.locate_batch(readings, channels, &mut explained),
-            Forward::Digit(digit) => digit.locate_batch(readings, channels, &mut explained),
-        }
+        self.model.locator().locate_batch(readings, channels, &mut explained);
         for (estimate, explained) in estimates.iter_mut().zip(explained) {
             *estimate = self.combine_estimates(explained, *estimate, extent);
         }
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
-        match &self.by {
-            Forward::Influence(influence) => influence.check(setup),
-            Forward::Digit(digit) => digit.check(setup),
-        }
+        self.model.locator().check(setup)
     }
 }
 
 impl ReadingCheck {
     fn combine_estimates(&self, explained: Estimate, estimate: Estimate, extent: Extent) -> Estimate {
-        let is_like_presses = self.own_intervals.is_some_and(|OwnIntervals { force_n }| {
-            let told = force_n.zip(explained.contact.force_n);
-            told.is_none_or(|((least, most), force_n)| (least..=most).contains(&force_n))
-        });
-        let moved = || {
-            let position = nearest_on(extent, estimate.contact.position);
-            ContactEstimate { position, ..estimate.contact }
-        };
-        let widened = || {
-            let contact = moved();
-            ContactEstimate { uncertainty: uncertainty_with(&contact, &explained.contact), ..contact }
+        let position = nearest_on(extent, estimate.contact.position);
+        let contact = ContactEstimate { position, ..estimate.contact };
+        let around = |other: &ContactEstimate| ContactEstimate {
+            uncertainty: other
+                .uncertainty
+                .map_or(contact.uncertainty, |uncertainty| Some(about_contact(uncertainty, other, &contact))),
+            ..contact
         };
         match explained.status {
             Status::NoContact => explained,
             Status::OutsideModel => Estimate { status: Status::OutsideModel, ..estimate },
-            Status::Ambiguous => Estimate { contact: widened(), ..explained },
-            Status::Located | Status::OutsideSurface if is_like_presses => {
-                let contact = moved();
-                let uncertainty = uncertainty_with(&contact, &estimate.contact);
-                Estimate { contact: ContactEstimate { uncertainty, ..contact }, ..explained }
+            Status::Located | Status::OutsideSurface if self.keeps_interval(&explained.contact) => {
+                Estimate { contact: around(&estimate.contact), ..explained }
             }
-            Status::Located | Status::OutsideSurface => Estimate { contact: widened(), ..explained },
+            Status::Located | Status::OutsideSurface | Status::Ambiguous => {
+                Estimate { contact: around(&explained.contact), ..explained }
+            }
         }
+    }
+
+    /// Contacts without a force, and those of pressed forces.
+    fn keeps_interval(&self, explained: &ContactEstimate) -> bool {
+        self.own_intervals.is_some_and(|OwnIntervals { force_n: pressed_n }| {
+            let forces = pressed_n.zip(explained.force_n);
+            forces.is_none_or(|((least_n, most_n), force_n)| (least_n..=most_n).contains(&force_n))
+        })
     }
 }
 
-/// Summed over coordinates; infinite without an interval.
+/// `None` for a fit that fails by other errors than [`Cancelled`].
+fn unless_cancelled<T, E: Error + 'static>(fit: Result<T, E>) -> Result<Option<T>, Cancelled> {
+    match fit {
+        Ok(fitted) => Ok(Some(fitted)),
+        Err(error) if Cancelled::caused(&error) => Err(Cancelled),
+        Err(_) => Ok(None),
+    }
+}
+
+/// Sum of the interval lengths of all coordinates; infinite without an interval.
 fn interval_m(estimate: &Estimate, extent: Extent) -> f64 {
-    let Some(told) = estimate.contact.uncertainty else { return f64::INFINITY };
-    let length_m = |(low, high): (f64, f64), side_m: f64| high.min(side_m) - low.max(0.0);
-    let y_m = extent.width_m().map_or(0.0, |width_m| length_m(told.y_95_m, width_m));
-    length_m(told.x_95_m, extent.length_m()) + y_m
+    let Some(uncertainty) = estimate.contact.uncertainty else { return f64::INFINITY };
+    let length_m = |interval: (f64, f64), side_m: f64| {
+        let (low_m, high_m) = clamped_interval(interval, side_m);
+        high_m - low_m
+    };
+    let y_m = extent.width_m().map_or(0.0, |width_m| length_m(uncertainty.y_95_m, width_m));
+    length_m(uncertainty.x_95_m, extent.length_m()) + y_m
 }
 
 fn nearest_on(extent: Extent, Position { x_m, y_m }: Position) -> Position {
-    let held = |at_m: f64, size_m: f64| at_m.max(0.0).min(size_m);
-    Position { x_m: held(x_m, extent.length_m()), y_m: held(y_m, extent.width_m().unwrap_or(0.0)) }
+    let clamp = |at_m: f64, side_m: f64| at_m.max(0.0).min(side_m);
+    Position { x_m: clamp(x_m, extent.length_m()), y_m: clamp(y_m, extent.width_m().unwrap_or(0.0)) }
 }
 
-fn uncertainty_with(estimate: &ContactEstimate, explained: &ContactEstimate) -> Option<Uncertainty> {
-    let Some(other) = explained.uncertainty else { return estimate.uncertainty };
-    let (at, there) = (estimate.position, explained.position);
-    let with = |(low, high): (f64, f64), x: f64| (low.min(x), high.max(x));
+/// Uncertainty of the estimate `other` about `contact`: second moments C + d·dᵀ, with the distance d between
+/// both, and intervals that contain `contact`.
+fn about_contact(
+    uncertainty: Uncertainty,
+    other: &ContactEstimate,
+    contact: &ContactEstimate,
+) -> Uncertainty {
+    let (at, there) = (contact.position, other.position);
     let (dx, dy) = (there.x_m - at.x_m, there.y_m - at.y_m);
-    let [xx, xy, xf, yy, yf, ff] = other.covariance;
-    Some(Uncertainty {
+    let [xx, xy, xf, yy, yf, ff] = uncertainty.covariance;
+    Uncertainty {
         covariance: [xx + dx * dx, xy + dx * dy, xf, yy + dy * dy, yf, ff],
-        x_95_m: with(other.x_95_m, at.x_m),
-        y_95_m: with(other.y_95_m, at.y_m),
-        force_95_n: other.force_95_n.zip(estimate.force_n).map(|(force_95_n, at_n)| with(force_95_n, at_n)),
-    })
+        x_95_m: extend_to(uncertainty.x_95_m, at.x_m),
+        y_95_m: extend_to(uncertainty.y_95_m, at.y_m),
+        force_95_n: uncertainty
+            .force_95_n
+            .zip(contact.force_n)
+            .map(|(interval, at_n)| extend_to(interval, at_n)),
+    }
 }
 
 #[cfg(test)]
