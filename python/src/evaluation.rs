@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use palpate::estimators::estimator::Status;
 use palpate::estimators::evaluation::{
-    self, ErrorSummary, EvaluatedContact, LocatedForce, Portion, limit_ratio, percentage_error,
+    self, CoveredCoordinates, ErrorSummary, EvaluatedContact, LocatedForce, Portion, limit_ratio,
+    percentage_error,
 };
 use palpate::estimators::setup;
 use palpate::mechanics::contact::Position;
@@ -64,7 +65,7 @@ impl Evaluation {
             }
         }
         fields.column("error", located().map(|located| Some(located.error_m())))?;
-        fields.column("covered", located().map(|located| located.covered.map(f64::from)))?;
+        fields.column("covered", located().map(|located| located.covered.map(CoveredCoordinates::share)))?;
         fields.column("interval_score", located().map(|located| located.interval_score_m))?;
         let force = |located: &EvaluatedContact| located.force.map(|force| force.estimate_n);
         fields.column("estimated_force", located().map(force))?;
@@ -138,13 +139,13 @@ impl Evaluation {
         self.field(py, "error")
     }
 
-    /// 1 where the locator's 95 % region contains the contact, 0 where it does not, NaN where it has none: of the shape (contacts).
+    /// Share of the coordinates (x; on a plane x and y) within the locator's 95 % intervals, NaN where it has none: of the shape (contacts).
     #[getter]
     fn covered<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.field(py, "covered")
     }
 
-    /// Share of the 95 % regions that contain their contact; None where the locator has none.
+    /// Share of the true coordinates within their 95 % intervals, on a plane the mean of the shares of x and y; None without intervals.
     #[getter]
     fn coverage(&self) -> Option<f64> {
         self.inner.coverage_percent().map(|percent| percent / 100.0)
@@ -381,12 +382,20 @@ fn figure(value: f64) -> String {
 
 /// Truth, force, estimate, coverage, interval score, index in `Status::ALL`, and estimated force
 /// with coverage.
-type PackedContact =
-    ((f64, f64), Option<f64>, (f64, f64), Option<bool>, Option<f64>, Option<usize>, Option<(f64, bool)>);
+type PackedContact = (
+    (f64, f64),
+    Option<f64>,
+    (f64, f64),
+    Option<(bool, Option<bool>)>,
+    Option<f64>,
+    Option<usize>,
+    Option<(f64, bool)>,
+);
 
 fn packed(located: &EvaluatedContact) -> PackedContact {
     let EvaluatedContact { truth, force_n, estimate, covered, interval_score_m, status, force } = *located;
     let status = status.and_then(|status| Status::ALL.iter().position(|of| *of == status));
+    let covered = covered.map(|covered| (covered.x, covered.y));
     let force = force.map(|force| (force.estimate_n, force.covered));
     ((truth.x_m, truth.y_m), force_n, (estimate.x_m, estimate.y_m), covered, interval_score_m, status, force)
 }
@@ -400,7 +409,7 @@ fn unpacked(
         truth: position(truth),
         force_n,
         estimate: position(estimate),
-        covered,
+        covered: covered.map(|(x, y)| CoveredCoordinates { x, y }),
         interval_score_m,
         status: status.and_then(|number| Status::ALL.get(number).copied()),
         force,

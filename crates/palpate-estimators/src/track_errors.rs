@@ -4,7 +4,7 @@ use crate::estimator::{
     ContactEstimate, Estimate, Locator, NotTrackable, SmoothTracker, Status, Track, TrackError,
     TrackedContact, TrackerConfig,
 };
-use crate::evaluation::covered;
+use crate::evaluation::CoveredCoordinates;
 use crate::recording::TimedRecording;
 use crate::setup::Setup;
 use crate::simulate::{MovingContacts, SimulateError, simulate_moving};
@@ -37,7 +37,8 @@ pub struct TrackErrors {
 struct Sums {
     contacts: usize,
     error_m: f64,
-    covered: usize,
+    /// Sum of the shares of covered coordinates.
+    covered: f64,
     numbers_right: usize,
 }
 
@@ -49,7 +50,8 @@ impl Sums {
             let (truth, contact) = (truths[truth], found[mate]);
             self.contacts += 1;
             self.error_m += contact.position.distance_m(truth);
-            self.covered += usize::from(covered(&contact, truth, extent) == Some(true));
+            let covered = CoveredCoordinates::new(&contact, truth, extent);
+            self.covered += covered.map_or(0.0, CoveredCoordinates::share);
         }
     }
 
@@ -76,8 +78,8 @@ impl TrackErrors {
             tracked: track.contacts,
             single_m: single.mean(single.error_m),
             track_m: track.mean(track.error_m),
-            single_covered: single.mean(single.covered as f64),
-            track_covered: track.mean(track.covered as f64),
+            single_covered: single.mean(single.covered),
+            track_covered: track.mean(track.covered),
             single_number_right: single.numbers_right as f64 / all,
             track_number_right: track.numbers_right as f64 / all,
         })

@@ -98,8 +98,8 @@ impl BeamCase {
             for located in calibration.run(&influence, seed, Watch::NONE)?.evaluation.located {
                 errors_mm.add(seed, 1e3 * located.error_m());
                 detected.add(seed, located.status != Some(Status::NoContact));
-                if let Some(is_covered) = located.covered {
-                    covered.add(seed, is_covered);
+                if let Some(coordinates) = located.covered {
+                    covered.add(seed, coordinates.x);
                 }
                 let touch = Contact { position: located.truth, force_n: located.force_n.unwrap_or(force_n) };
                 let is_inner = (ENDS..=1.0 - ENDS).contains(&(touch.position.x_m / length_m));

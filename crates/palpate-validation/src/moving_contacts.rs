@@ -82,7 +82,7 @@ fn run(size: Size, progress: Progress) -> Result<Vec<Table>> {
         ),
         Table::new("Beam by the share of its critical speed.", &LABELS, Tally::columns()),
         Table::new(
-            "Plate: nine sensors of 20 µm noise, 5 N, four times across; coverage is by 95 % ellipses.",
+            "Plate: nine sensors of 20 µm noise, 5 N, four times across; coverage is the mean of both coordinates.",
             &LABELS,
             Tally::columns(),
         ),

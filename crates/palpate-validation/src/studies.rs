@@ -229,7 +229,7 @@ impl ArmFits<'_> {
                 }
                 converged.percent()
             }
-            Measure::Covered => self.share(|located| located.covered),
+            Measure::Covered => self.share(|located| located.covered.map(|covered| covered.x)),
         }
     }
 

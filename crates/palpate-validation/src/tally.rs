@@ -1,5 +1,6 @@
 use crate::statistics::{Sample, Share};
 use crate::table::{Column, Figure, Goal};
+use palpate::estimators::evaluation::CoveredCoordinates;
 use palpate::estimators::interval_check::IntervalCheck;
 use palpate::prelude::{Estimate, Evaluation, Status};
 
@@ -75,8 +76,8 @@ impl Tally {
     pub fn add_touches(&mut self, calibration: u64, evaluation: &Evaluation) {
         for located in &evaluation.located {
             self.errors_mm.add(calibration, 1e3 * located.error_m());
-            if let Some(covered) = located.covered {
-                self.position_covered.add(calibration, covered);
+            for is_covered in located.covered.into_iter().flat_map(CoveredCoordinates::coordinates) {
+                self.position_covered.add(calibration, is_covered);
             }
             if let Some(force) = located.force {
                 self.force_covered.add(calibration, force.covered);

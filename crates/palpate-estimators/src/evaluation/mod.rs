@@ -1,56 +1,33 @@
 //! Errors of a locator.
 
 mod calibration;
+mod contact;
+mod cross_validation;
+mod intervals;
+mod limit_ratio;
 mod mapped_positions;
 
 pub use crate::split::{Split, SplitOrigin};
 pub use calibration::{Calibration, CalibrationTrial, simulate_use_all_over_watched};
+pub use contact::{EvaluatedContact, LocatedForce};
+pub(crate) use cross_validation::evaluate_held_out;
+pub use cross_validation::{EvaluationError, TimedEvaluation, cross_validate, evaluate_splits};
+pub use intervals::CoveredCoordinates;
+pub use limit_ratio::limit_ratio;
 pub use mapped_positions::{MappedPositions, SurfaceMap};
 pub use palpate_numerics::{median, percentile};
 
 use crate::batch::{BatchError, BatchOptions};
-use crate::estimate_record::ContactRecord;
-use crate::fit::{Fit, FitTask, Fitted, HeldOut, HoldOutError, HoldOutTask, Locate, ReadingError};
-use crate::interval_check::{HeldOutEstimate, widen_by_other_folds};
+use crate::fit::{Fitted, Locate, ReadingError};
 use crate::load_profile::Cells;
-use crate::recording::{Recording, Row, TooFewPositions};
-use crate::setup::Setup;
-use crate::simulate::SimulateError;
-use palpate_core::{ContactEstimate, Estimate, Status};
-use palpate_mechanics::contact::{Contact, Position};
+use crate::recording::{Recording, Row};
+use intervals::score_of_interval;
+use palpate_core::{Estimate, Status};
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::small::Ldl;
-use palpate_numerics::watch::{Cancelled, Watch};
-use palpate_numerics::{ELLIPSE_95, mean, root_mean_square};
+use palpate_numerics::watch::Watch;
+use palpate_numerics::{mean, root_mean_square};
 use std::sync::{Mutex, PoisonError};
-
-/// True and estimated contact of one reading.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EvaluatedContact {
-    /// True position.
-    pub truth: Position,
-    /// True force, where known.
-    pub force_n: Option<f64>,
-    /// Estimated position.
-    pub estimate: Position,
-    /// True for a contact in the 95 % region.
-    pub covered: Option<bool>,
-    /// Interval score: see [`Evaluation::interval_score_m`].
-    pub interval_score_m: Option<f64>,
-    /// Status of the estimate, where kept.
-    pub status: Option<Status>,
-    /// Estimated force, where the true one is known.
-    pub force: Option<LocatedForce>,
-}
-
-/// Estimated force of one reading.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LocatedForce {
-    /// Estimate.
-    pub estimate_n: f64,
-    /// True for a force in the 95 % interval.
-    pub covered: bool,
-}
 
 /// Summary of force errors.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -67,34 +44,6 @@ pub struct ForceSummary {
     pub largest_n: f64,
     /// Coverage of the 95 % intervals.
     pub coverage_percent: f64,
-}
-
-impl EvaluatedContact {
-    fn new(row: &Row, estimate: &Estimate, extent: Extent) -> Self {
-        Self::of_contact(row.position, row.force_n, estimate, extent)
-    }
-
-    fn of_contact(truth: Position, force_n: Option<f64>, estimate: &Estimate, extent: Extent) -> Self {
-        let contact = &estimate.contact;
-        let force = || {
-            let [low_n, high_n] = ContactRecord::new(contact, extent).force_interval_95_n()?;
-            Some(LocatedForce { estimate_n: contact.force_n?, covered: (low_n..=high_n).contains(&force_n?) })
-        };
-        Self {
-            truth,
-            force_n,
-            estimate: contact.position,
-            covered: covered(contact, truth, extent),
-            interval_score_m: interval_score_m(contact, truth, extent),
-            status: Some(estimate.status),
-            force: force(),
-        }
-    }
-
-    /// Position error.
-    pub fn error_m(&self) -> f64 {
-        self.truth.distance_m(self.estimate)
-    }
 }
 
 /// Estimates of a locator for a recording.
@@ -149,34 +98,6 @@ pub fn percentage_error(error_m: f64, length_m: f64) -> f64 {
     error_m / length_m * 100.0
 }
 
-/// True for `truth` in the 95 % interval or ellipse (e − t)ᵀ·C⁻¹·(e − t) ≤ [`ELLIPSE_95`].
-pub(crate) fn covered(contact: &ContactEstimate, truth: Position, extent: Extent) -> Option<bool> {
-    let uncertainty = contact.uncertainty?;
-    if let Extent::Line { .. } = extent {
-        let (low, high) = uncertainty.x_95_m;
-        return Some((low..=high).contains(&truth.x_m));
-    }
-    let [xx, xy, _, yy, ..] = uncertainty.covariance;
-    let (dx, dy) = (contact.position.x_m - truth.x_m, contact.position.y_m - truth.y_m);
-    let factors = Ldl::new(&[[xx, xy], [xy, yy]]);
-    Some(factors.is_some_and(|factors| factors.quadratic([dx, dy]) <= ELLIPSE_95))
-}
-
-fn interval_score_m(contact: &ContactEstimate, truth: Position, extent: Extent) -> Option<f64> {
-    let uncertainty = contact.uncertainty?;
-    let x = score_of_interval(uncertainty.x_95_m, truth.x_m);
-    Some(match extent {
-        Extent::Line { .. } => x,
-        Extent::Plane { .. } => 0.5 * (x + score_of_interval(uncertainty.y_95_m, truth.y_m)),
-    })
-}
-
-/// u − l + 2/α·(l − x)⁺ + 2/α·(x − u)⁺ for α = 0.05.
-fn score_of_interval((low, high): (f64, f64), truth: f64) -> f64 {
-    const ALPHA: f64 = 0.05;
-    high - low + 2.0 / ALPHA * ((low - truth).max(0.0) + (truth - high).max(0.0))
-}
-
 impl Evaluation {
     /// Locates every contact of a recording.
     ///
@@ -212,9 +133,9 @@ impl Evaluation {
         let readings: Vec<f64> = rows.iter().flat_map(|row| row.reading.iter().copied()).collect();
         let located = Mutex::new(Vec::with_capacity(rows.len()));
         let take = |first: usize, estimates: &[Estimate]| {
-            let judged = rows[first..].iter().zip(estimates);
-            let judged = judged.map(|(row, estimate)| EvaluatedContact::new(row, estimate, extent));
-            located.lock().unwrap_or_else(PoisonError::into_inner).extend(judged);
+            let contacts = rows[first..].iter().zip(estimates);
+            let contacts = contacts.map(|(row, estimate)| EvaluatedContact::new(row, estimate, extent));
+            located.lock().unwrap_or_else(PoisonError::into_inner).extend(contacts);
         };
         locator.locate_blocks(&readings, BatchOptions { watch, ..BatchOptions::default() }, &take)?;
         Ok(Self { extent, located: located.into_inner().unwrap_or_else(PoisonError::into_inner) })
@@ -241,11 +162,13 @@ impl Evaluation {
         100.0 * good as f64 / self.located.len() as f64
     }
 
-    /// Coverage of the 95 % regions.
+    /// Share of the true coordinates within their 95 % intervals, in %. On planes it is the mean of the shares
+    /// of x and y.
     pub fn coverage_percent(&self) -> Option<f64> {
-        let told: Vec<bool> = self.located.iter().filter_map(|located| located.covered).collect();
-        let held = told.iter().filter(|covered| **covered).count();
-        (!told.is_empty()).then(|| 100.0 * held as f64 / told.len() as f64)
+        let covered = self.located.iter().filter_map(|located| located.covered);
+        let coordinates: Vec<bool> = covered.flat_map(CoveredCoordinates::coordinates).collect();
+        let count = coordinates.iter().filter(|is_covered| **is_covered).count();
+        (!coordinates.is_empty()).then(|| 100.0 * count as f64 / coordinates.len() as f64)
     }
 
     /// Share of each status in %, in the order of [`Status::ALL`].
@@ -287,9 +210,9 @@ impl Evaluation {
     ///
     /// Without intervals: constant ones, ± the 95th percentile of errors.
     pub fn interval_score_m(&self) -> Option<f64> {
-        let told: Vec<f64> = self.located.iter().filter_map(|located| located.interval_score_m).collect();
-        if !told.is_empty() && told.len() == self.located.len() {
-            return Some(mean(told));
+        let scores: Vec<f64> = self.located.iter().filter_map(|located| located.interval_score_m).collect();
+        if !scores.is_empty() && scores.len() == self.located.len() {
+            return Some(mean(scores));
         }
         let half_m = percentile(&sorted_errors_m(&self.located), 95.0)?;
         let scores =
@@ -345,42 +268,6 @@ fn sorted_errors_m<'a>(located: impl IntoIterator<Item = &'a EvaluatedContact>) 
     errors
 }
 
-/// Ill-conditioned share of the length and width at each end.
-const ENDS: f64 = 1.0 / 80.0;
-/// Relative to the length; larger bounds are not attained.
-const LARGE_LIMIT: f64 = 1.0 / 200.0;
-/// Two coordinates share the information.
-const LARGE_LIMIT_ON_A_PLANE: f64 = 1.0 / 20.0;
-
-/// Returns the mean error over the mean Cramér–Rao bound, without contacts within 1/80 of an end or side, and
-/// without bounds above 1/200 of the length (plane: 1/20).
-pub fn limit_ratio(setup: &Setup, evaluation: &Evaluation) -> Option<f64> {
-    let limit = setup.cramer_rao_bound().ok()?;
-    let extent = setup.surface().extent();
-    let within =
-        |at_m: f64, size_m: f64| (ENDS * size_m - 1e-9..=(1.0 - ENDS) * size_m + 1e-9).contains(&at_m);
-    let is_inner = |at: Position| {
-        within(at.x_m, extent.length_m()) && extent.width_m().is_none_or(|width_m| within(at.y_m, width_m))
-    };
-    let large = match extent {
-        Extent::Line { .. } => LARGE_LIMIT,
-        Extent::Plane { .. } => LARGE_LIMIT_ON_A_PLANE,
-    };
-    let (mut error_m, mut bound_m) = (0.0, 0.0);
-    for located in &evaluation.located {
-        let Some(force_n) = located.force_n.or(setup.force_n()) else { continue };
-        let bound = limit.bound_at(Contact { position: located.truth, force_n }, setup.force());
-        let Some(bound) = bound.filter(|bound| bound.sd_position_m <= large * extent.length_m()) else {
-            continue;
-        };
-        if is_inner(located.truth) {
-            error_m += located.error_m();
-            bound_m += bound.mean_error_m();
-        }
-    }
-    (bound_m > 0.0).then(|| error_m / bound_m)
-}
-
 /// Median, 5th and 95th percentile over seeds.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Quantiles {
@@ -407,108 +294,6 @@ impl Quantiles {
             p95: percentile(&values, 95.0)?,
         })
     }
-}
-
-/// Evaluation over splits, with computing times.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TimedEvaluation {
-    /// Estimates.
-    pub evaluation: Evaluation,
-    /// Mean time of a fit.
-    pub fit_seconds: f64,
-    /// Mean time of an estimate.
-    pub locate_ns: f64,
-}
-
-/// Fits and evaluates an estimator on each split, with a `clock` in seconds.
-///
-/// # Errors
-/// [`EvaluationError`].
-pub fn evaluate_splits<E: Fit>(
-    setup: &Setup,
-    estimator: &E,
-    splits: &[Split],
-    seed: u64,
-    clock: &dyn Fn() -> f64,
-    watch: Watch,
-) -> Result<TimedEvaluation, EvaluationError<E::Error>> {
-    let fit = |_, task: FitTask| Ok((estimator.fit_without_interval_check(task)?, 0.0));
-    evaluate_held_out(&HoldOutTask { setup, splits, seed, clock, watch, memo: None }, fit)
-}
-
-pub(crate) fn evaluate_held_out<M: Locate, E: std::error::Error>(
-    task: &HoldOutTask,
-    fit: impl Fn(usize, FitTask) -> Result<(Fitted<M>, f64), E>,
-) -> Result<TimedEvaluation, EvaluationError<E>> {
-    let HoldOutTask { setup, splits, .. } = *task;
-    let extent = setup.surface().extent();
-    let held_out = task.run(fit).map_err(|error| match error {
-        HoldOutError::Fit(error) => EvaluationError::Fit(error),
-        HoldOutError::Reading(error) => error.into(),
-    })?;
-    let HeldOut { mut estimates, fitting_s, locating_s } = held_out;
-    if splits.iter().all(|split| split.origin == SplitOrigin::Fold) {
-        widen_by_other_folds(&mut estimates, extent);
-    }
-    let located = estimates.iter().map(|HeldOutEstimate { truth, force_n, estimate, .. }| {
-        EvaluatedContact::of_contact(*truth, *force_n, estimate, extent)
-    });
-    let evaluation = Evaluation { extent, located: located.collect() };
-    let readings = evaluation.located.len().max(1) as f64;
-    Ok(TimedEvaluation {
-        evaluation,
-        fit_seconds: fitting_s / splits.len().max(1) as f64,
-        locate_ns: locating_s / readings * 1e9,
-    })
-}
-
-/// Error of an evaluation.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum EvaluationError<E: std::error::Error + 'static> {
-    /// Failed simulation.
-    #[error(transparent)]
-    Simulate(#[from] SimulateError),
-    /// Too few positions for the folds.
-    #[error(transparent)]
-    Positions(#[from] TooFewPositions),
-    /// Failed fit.
-    #[error(transparent)]
-    Fit(E),
-    /// Invalid reading.
-    #[error(transparent)]
-    Reading(#[from] ReadingError),
-}
-
-impl<E: From<Cancelled> + std::error::Error + 'static> From<Cancelled> for EvaluationError<E> {
-    fn from(cancelled: Cancelled) -> Self {
-        Self::Fit(cancelled.into())
-    }
-}
-
-/// Returns held-out estimates by position (see [`Recording::folds`](crate::recording::Recording::folds)),
-/// with any choice of estimator in each fold.
-///
-/// ```
-/// use palpate_estimators::{arrangement::Training, evaluation::cross_validate, fit::FitTask, influence::Influence, setup::Setup};
-/// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
-///
-/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
-/// let presses = setup.simulate(&Training::even(10).repeated(5), 0)?;
-/// let held_out = cross_validate(&Influence::default(), FitTask::new(&setup, &presses), 5)?;
-/// assert!(held_out.summary(None).expect("50 presses").median_m < mm(1.0));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
-/// # Errors
-/// [`EvaluationError`].
-pub fn cross_validate<E: Fit>(
-    estimator: &E,
-    task: FitTask,
-    folds: usize,
-) -> Result<Evaluation, EvaluationError<E::Error>> {
-    let splits = Split::by_folds(task.recording, folds)?;
-    Ok(evaluate_splits(task.setup, estimator, &splits, task.seed, &|| 0.0, task.watch)?.evaluation)
 }
 
 #[cfg(test)]

@@ -1,4 +1,6 @@
 use super::*;
+use crate::fit::Fit;
+use palpate_numerics::watch::Cancelled;
 
 /// Ten contacts along 100 mm; the error of the k-th is k/2 mm to the right.
 fn evaluation() -> Evaluation {

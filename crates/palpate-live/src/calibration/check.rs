@@ -1,7 +1,7 @@
 use super::plan::{PlaceGrid, Weights};
 use super::press::Press;
 use palpate_estimators::estimator::Locator;
-use palpate_estimators::evaluation::Evaluation;
+use palpate_estimators::evaluation::{CoveredCoordinates, EvaluatedContact, Evaluation};
 use palpate_estimators::fit::ReadingError;
 use palpate_estimators::recording::{Recording, Row};
 use palpate_mechanics::contact::Position;
@@ -98,7 +98,7 @@ pub struct CheckedPlace {
     pub estimate: Position,
     /// Distance between both, in metres.
     pub error_m: f64,
-    /// True if the 95 % region contains the place; `None` without regions.
+    /// True if the 95 % intervals of all coordinates contain the place; `None` without intervals.
     pub covered: Option<bool>,
 }
 
@@ -111,7 +111,7 @@ pub struct Check {
     pub median_m: f64,
     /// Mean error, in metres.
     pub mean_m: f64,
-    /// Places in their 95 % regions; `None` without regions.
+    /// Places within the 95 % intervals of all coordinates; `None` without intervals.
     pub covered: Option<usize>,
 }
 
@@ -123,15 +123,16 @@ impl Check {
     pub fn new(locator: &Locator, recording: &Recording) -> Result<Option<Self>, ReadingError> {
         let evaluation = Evaluation::new(locator, &tared(locator, recording))?;
         let Some(summary) = evaluation.summary(None) else { return Ok(None) };
-        let places = evaluation.located.iter().map(|located| CheckedPlace {
+        let checked = |located: &EvaluatedContact| CheckedPlace {
             position: located.truth,
             estimate: located.estimate,
             error_m: located.error_m(),
-            covered: located.covered,
-        });
-        let covered = evaluation.located.iter().map(|located| located.covered).collect::<Option<Vec<bool>>>();
+            covered: located.covered.map(CoveredCoordinates::all),
+        };
+        let places: Vec<CheckedPlace> = evaluation.located.iter().map(checked).collect();
+        let covered = places.iter().map(|place| place.covered).collect::<Option<Vec<bool>>>();
         Ok(Some(Self {
-            places: places.collect(),
+            places,
             median_m: summary.median_m,
             mean_m: summary.average_m,
             covered: covered.map(|covered| covered.into_iter().filter(|covered| *covered).count()),

@@ -6,7 +6,7 @@
 
 use super::super::run::{ArmFit, PreparedStudy, TrainedSeed};
 use super::{RowProblem, fit_of, read_cell};
-use palpate_estimators::evaluation::{EvaluatedContact, Evaluation};
+use palpate_estimators::evaluation::{CoveredCoordinates, EvaluatedContact, Evaluation};
 use palpate_estimators::recording::csv_row;
 use palpate_mechanics::contact::Position;
 
@@ -23,7 +23,7 @@ pub fn header() -> String {
 pub fn row(study: &PreparedStudy, ArmFit { arm, fit }: &ArmFit) -> String {
     let located = &fit.evaluation.located;
     let estimates: Vec<String> = located.iter().map(|at| at.estimate.x_m.to_string()).collect();
-    let held: String = located.iter().map(|at| character(at.covered)).collect();
+    let held: String = located.iter().map(|at| character(at.covered.map(|covered| covered.x))).collect();
     let score = |at: &EvaluatedContact| {
         at.interval_score_m.map_or_else(|| NOT_TOLD.to_owned(), |score| score.to_string())
     };
@@ -66,7 +66,7 @@ pub fn read(study: &PreparedStudy, row: &str) -> Result<ArmFit, RowProblem> {
             truth: contact.position,
             force_n: Some(contact.force_n),
             estimate: Position::along(estimates_m[i].ok_or_else(|| not_finite(ESTIMATES, NOT_TOLD))?),
-            covered: held[i],
+            covered: held[i].map(|x| CoveredCoordinates { x, y: None }),
             interval_score_m: scores_m[i],
             status: None,
             force: None,

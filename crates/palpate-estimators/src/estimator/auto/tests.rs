@@ -1,4 +1,5 @@
 use super::*;
+use crate::evaluation::CoveredCoordinates;
 use crate::fit::Fit;
 use crate::fixtures::paper;
 use crate::recording::Row;
@@ -116,7 +117,7 @@ fn the_simplest_structure_that_is_not_significantly_worse_is_chosen() {
                 truth,
                 force_n: None,
                 estimate: Position::along(truth.x_m + error_m),
-                covered: Some(true),
+                covered: Some(CoveredCoordinates { x: true, y: None }),
                 interval_score_m: Some(4.0 * error_m),
                 status: None,
                 force: None,
