@@ -1,21 +1,14 @@
 //! Bounds of sums over a load of any shape, without a prior.
 //!
-//! With A, x ≥ 0 and y as in [the module above](super), the 95 % bounds of c·x include v if some load with
-//! c·x = v has ‖A·x − y‖² within [`RATIO_95`] of the minimum (profile likelihood: Rust and Burrus,
-//! *Mathematical Programming and the Numerical Solution of Linear Equations*, 1972; Kuusela and Stark,
-//! *Annals of Applied Statistics* 11, 2017).
-//!
-//! By the Karush–Kuhn–Tucker conditions, the minimum of ‖A·x − y‖² + ρ²·(c·x − t)² over x ≥ 0 has the least
-//! misfit for its own sum, which increases with t.
+//! With A, x ≥ 0 and y as in [the module above](super), the 95 % bounds of c·x are those of the
+//! [profile likelihood](super::profile_likelihood) of ‖A·x − y‖² (Rust and Burrus, *Mathematical Programming
+//! and the Numerical Solution of Linear Equations*, 1972; Kuusela and Stark, *Annals of Applied Statistics*
+//! 11, 2017).
 
+use super::profile_likelihood::{NON_NEGATIVE_INCREASE, Profile, ProfilePoint};
 use ndarray::{Array1, Array2};
 use palpate_numerics::{Cholesky, extend_to};
 
-/// Critical misfit increase. The unconstrained 3.84 (χ², 95 %) covers only 92 %, because x ≥ 0 increases the
-/// least misfit.
-const RATIO_95: f64 = 5.0;
-/// Beyond these doublings of a step the sum is unbounded.
-const MOST_DOUBLINGS: usize = 40;
 const MOST_STEPS: usize = 40;
 const NEGLIGIBLE: f64 = 1e-3;
 
@@ -30,13 +23,7 @@ pub(super) struct Bounds {
     stiffness: f64,
 }
 
-/// Load of least misfit for its sum.
-#[derive(Clone)]
-struct Least {
-    load: Array1<f64>,
-    sum: f64,
-    chi_squared: f64,
-}
+type Least = ProfilePoint<Array1<f64>>;
 
 impl Bounds {
     pub fn new(influence: &Array2<f64>, y: &Array1<f64>) -> Self {
@@ -44,19 +31,19 @@ impl Bounds {
         let stiffness = gram.diag().sum() / gram.nrows().max(1) as f64;
         let best = LeastSquares { gram: &gram, right: &right, drawn: None }.non_negative();
         let square = y.dot(y);
-        let most = squared_residual((&gram, &right, square), &best) + RATIO_95;
+        let most = squared_residual((&gram, &right, square), &best) + NON_NEGATIVE_INCREASE;
         Self { gram, right, square, best, most, stiffness }
     }
 
     pub fn least_misfit(&self) -> f64 {
-        self.most - RATIO_95
+        self.most - NON_NEGATIVE_INCREASE
     }
 
     /// Bounds of c·x, possibly infinite.
     pub fn of_sum(&self, c: &Array1<f64>) -> (f64, f64) {
         let [low, high] = [-1.0, 1.0].map(|side| self.bound(c, side));
-        let low = low.map_or(f64::NEG_INFINITY, |(sum, _)| sum);
-        let high = high.map_or(f64::INFINITY, |(sum, _)| sum);
+        let low = low.map_or(f64::NEG_INFINITY, |end| end.value);
+        let high = high.map_or(f64::INFINITY, |end| end.value);
         // A sum of forces is at least 0.
         let low = if c.iter().all(|c| *c >= 0.0) { low.max(0.0) } else { low };
         (low, high)
@@ -81,7 +68,7 @@ impl Bounds {
             for _ in 0..MOST_STEPS {
                 let mut c = Array1::zeros(self.right.len());
                 cells.iter().zip(coordinates).for_each(|(cell, a)| c[*cell] = (a - v) / size);
-                let next = self.bound(&c, side).map(|(_, load)| mean(&load));
+                let next = self.bound(&c, side).map(|end| mean(&end.load));
                 let Some(Some(next)) = next else { return end };
                 let gain = side * (next - v);
                 if gain > 0.0 {
@@ -96,56 +83,26 @@ impl Bounds {
         if size > 0.0 { (bound(-1.0, ends.0), bound(1.0, ends.1)) } else { ends }
     }
 
-    /// Sum with the greatest accepted misfit on one side, and an accepted load near it.
-    fn bound(&self, c: &Array1<f64>, side: f64) -> Option<(f64, Array1<f64>)> {
-        let best = c.dot(&self.best);
-        let step = side * 0.01 * best.abs().max(1.0 / self.stiffness.sqrt());
-        let least = Least { load: self.best.clone(), sum: best, chi_squared: self.least_misfit() };
-        let (mut inside, mut way) = ((best, least), step);
-        for _ in 0..MOST_DOUBLINGS {
-            let t = best + way;
-            let least = self.least(c, t);
-            if least.chi_squared > self.most {
-                return Some(self.critical_value_between(c, inside, (t, least)));
-            }
+    /// End of c·x on one side.
+    fn bound(&self, c: &Array1<f64>, side: f64) -> Option<Least> {
+        let value = c.dot(&self.best);
+        let step = side * 0.01 * value.abs().max(1.0 / self.stiffness.sqrt());
+        let best = Least { load: self.best.clone(), value, chi_squared: self.least_misfit() };
+        let is_force = c.iter().all(|c| *c >= 0.0);
+        let profile = Profile {
+            most: self.most,
+            minimum: |target, _: &Array1<f64>| self.least(c, target),
             // No load has a sum below 0.
-            if side < 0.0 && least.sum <= 0.0 && c.iter().all(|c| *c >= 0.0) {
-                return Some((0.0, least.load));
-            }
-            inside = (t, least);
-            way *= 2.0;
-        }
-        None
-    }
-
-    /// As `bound`, between two targets t.
-    fn critical_value_between(
-        &self,
-        c: &Array1<f64>,
-        mut inside: (f64, Least),
-        mut outside: (f64, Least),
-    ) -> (f64, Array1<f64>) {
-        for _ in 0..MOST_STEPS {
-            let over = outside.1.chi_squared - self.most;
-            if over < NEGLIGIBLE || self.most - inside.1.chi_squared < NEGLIGIBLE {
-                break;
-            }
-            let t = 0.5 * (inside.0 + outside.0);
-            let least = self.least(c, t);
-            let end = if least.chi_squared > self.most { &mut outside } else { &mut inside };
-            *end = (t, least);
-        }
-        let (inside, outside) = (inside.1, outside.1);
-        let share = (self.most - inside.chi_squared)
-            / (outside.chi_squared - inside.chi_squared).max(f64::MIN_POSITIVE);
-        (inside.sum + share * (outside.sum - inside.sum), inside.load)
+            is_stationary: |_: &Least, point: &Least, _| side < 0.0 && is_force && point.value <= 0.0,
+        };
+        profile.end(best, step)
     }
 
     fn least(&self, c: &Array1<f64>, t: f64) -> Least {
         let drawn = Some((c, self.stiffness, t));
         let x = LeastSquares { gram: &self.gram, right: &self.right, drawn }.non_negative();
         Least {
-            sum: c.dot(&x),
+            value: c.dot(&x),
             chi_squared: squared_residual((&self.gram, &self.right, self.square), &x),
             load: x,
         }
@@ -272,7 +229,7 @@ mod tests {
         // One sensor, one cell: x = y/a ± √5/a.
         let bounds = Bounds::new(&Array2::from_elem((1, 1), 2.0), &Array1::from(vec![20.0]));
         let (low, high) = bounds.of_sum(&Array1::ones(1));
-        let half = 0.5 * RATIO_95.sqrt();
+        let half = 0.5 * NON_NEGATIVE_INCREASE.sqrt();
         assert!((low - (10.0 - half)).abs() < 1e-3 && (high - (10.0 + half)).abs() < 1e-3, "{low} {high}");
         // A cell without a sensitive sensor has no upper bound, and a small reading may have the lower bound
         // 0.
@@ -293,7 +250,7 @@ mod tests {
         let (low, high) = bounds.of_mean(&[0, 1], &[0.0, 1.0]);
         assert!(low < 1.0 / 3.0 && 1.0 / 3.0 < high, "{low} {high}");
         for end in [low, high] {
-            assert!((misfit(end) - RATIO_95).abs() < 0.1, "{end}: {}", misfit(end));
+            assert!((misfit(end) - NON_NEGATIVE_INCREASE).abs() < 0.1, "{end}: {}", misfit(end));
         }
         // One cell has one mean, and an insensitive cell may have all of the load.
         assert_eq!(bounds.of_mean(&[1], &[0.3]), (0.3, 0.3));

@@ -1,23 +1,20 @@
 //! Patches as uniform loads, with likelihood-ratio intervals that do not depend on a prior.
 //!
-//! A patch is a force F, uniform over a width w around a centre c. The 95 % interval of a force, centre or
-//! centre of pressure includes v if some loads with that value have ‖y − Σ F·m(c, w)‖² within [`RATIO_95`] of
-//! the minimum, with mean influences m over noise (profile likelihood: Pawitan, *In All Likelihood*, 2001,
-//! section 3.4).
+//! A patch is a force F, uniform over a width w around a centre c. The 95 % intervals of forces, centres and
+//! centres of pressure are those of the [profile likelihood](super::profile_likelihood) of ‖y − Σ F·m(c, w)‖²,
+//! with mean influences m over noise.
 //!
-//! As in [`super::bounds`], the minimum with penalty ρ²·(v − t)² has the least misfit for its own v. Minima
-//! are by Levenberg–Marquardt with clamped unknowns. Readings are linear in the square of a small width, so
-//! the unknown is s in w² = w_min² + s·(w_max(c)² − w_min²), with w_min the node distance.
+//! Minima are by Levenberg–Marquardt with clamped unknowns. Readings are linear in the square of a small
+//! width, so the unknown is s in w² = w_min² + s·(w_max(c)² − w_min²), with w_min the node distance.
 
 use super::cells::Cells;
 use super::cumulative::CumulativeInfluence;
+use super::profile_likelihood::{FREE_INCREASE, Profile, ProfilePoint};
 use ndarray::{Array1, Array2, ArrayView1};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::{Extent, UniformLoad};
 use palpate_numerics::{Cholesky, chi_squared_critical_value};
 
-/// 95 % quantile of χ², one degree of freedom.
-const RATIO_95: f64 = 3.84;
 /// Least share of a whole side.
 const WHOLE: f64 = 0.95;
 /// Points for a median.
@@ -31,9 +28,6 @@ const MOST_STEPS: usize = 200;
 const FIRST_DAMPING: f64 = 1e-4;
 const LEAST_DAMPING: f64 = 1e-12;
 const MOST_DAMPING: f64 = 1e6;
-/// Beyond these doublings of a step the value is unbounded.
-const MOST_DOUBLINGS: usize = 40;
-const MOST_HALVINGS: usize = 20;
 
 /// Uniform loads, one per patch.
 pub(super) struct EvenLoads<'a> {
@@ -428,13 +422,13 @@ impl<'a> EvenLoads<'a> {
 
     /// Value with the critical misfit; `None` without an end on the surface.
     fn end(&self, aim: LoadQuantity, step: f64) -> Option<f64> {
-        let (end, unknowns) = self.end_at(aim, step, RATIO_95)?;
-        if unknowns.chunks(self.each()).any(|load| self.is_whole(load)) {
+        let end = self.end_at(aim, step, FREE_INCREASE)?;
+        if end.load.chunks(self.each()).any(|load| self.is_whole(load)) {
             // The force of a load over the whole surface is unique, so it also determines centres and widths.
-            let ratio = chi_squared_critical_value(0.05, self.each());
-            return self.end_at(aim, step, ratio).map(|(end, _)| end);
+            let increase = chi_squared_critical_value(0.05, self.each());
+            return self.end_at(aim, step, increase).map(|end| end.value);
         }
-        Some(end)
+        Some(end.value)
     }
 
     /// True over the whole surface.
@@ -443,53 +437,26 @@ impl<'a> EvenLoads<'a> {
         (0..self.dimensions).all(|axis| ends_m[axis][1] - ends_m[axis][0] >= WHOLE * self.table.side_m(axis))
     }
 
-    /// End for misfits up to the least plus `ratio`, with its unknowns.
-    fn end_at(&self, aim: LoadQuantity, step: f64, ratio: f64) -> Option<(f64, Vec<f64>)> {
-        let most = self.best.chi_squared + ratio;
+    /// End for misfits up to the least plus `increase`.
+    fn end_at(&self, aim: LoadQuantity, step: f64, increase: f64) -> Option<ProfilePoint<Vec<f64>>> {
         let stiffness = 1.0 / (step * step);
-        let start = self.value_at(aim, &self.best.unknowns);
-        let (mut inside, mut from, mut way) = (self.best.clone(), start, 2.0 * step);
-        for _ in 0..MOST_DOUBLINGS {
-            let t = start + way;
-            let found = self.minimum(inside.unknowns.clone(), Some((aim, t, stiffness)), &[]);
-            if found.chi_squared > most {
-                return self.critical_value_between((aim, stiffness, most), (from, inside), (t, found));
-            }
-            let (was, is) = (self.value_at(aim, &inside.unknowns), self.value_at(aim, &found.unknowns));
-            (inside, from) = (found, t);
-            // The value does not move to the target. A value that moves little may be determined far better
-            // than to first order, such as the force of a load of greatest width.
-            if way.abs() > 8.0 * step.abs() && (is - was).abs() < 1e-9 * step.abs() {
-                return (!self.is_at_edge(aim, &inside.unknowns)).then_some((is, inside.unknowns));
-            }
-            way *= 2.0;
-        }
-        None
-    }
-
-    /// Critical value between two targets t.
-    fn critical_value_between(
-        &self,
-        (aim, stiffness, most): (LoadQuantity, f64, f64),
-        mut inside: (f64, Minimum),
-        mut outside: (f64, Minimum),
-    ) -> Option<(f64, Vec<f64>)> {
-        for _ in 0..MOST_HALVINGS {
-            if outside.1.chi_squared - most < 10.0 * NEGLIGIBLE
-                || most - inside.1.chi_squared < 10.0 * NEGLIGIBLE
-            {
-                break;
-            }
-            let t = inside.0.midpoint(outside.0);
-            let found = self.minimum(inside.1.unknowns.clone(), Some((aim, t, stiffness)), &[]);
-            let end = if found.chi_squared > most { &mut outside } else { &mut inside };
-            *end = (t, found);
-        }
-        let [low, high] = [&inside, &outside]
-            .map(|(_, minimum)| (minimum.chi_squared, self.value_at(aim, &minimum.unknowns)));
-        let share = (most - low.0) / (high.0 - low.0).max(f64::MIN_POSITIVE);
-        let end = low.1 + share * (high.1 - low.1);
-        (!self.is_at_edge(aim, &inside.1.unknowns)).then_some((end, inside.1.unknowns))
+        let point = |Minimum { unknowns, chi_squared }| ProfilePoint {
+            value: self.value_at(aim, &unknowns),
+            load: unknowns,
+            chi_squared,
+        };
+        let profile = Profile {
+            most: self.best.chi_squared + increase,
+            minimum: |target, near: &Vec<f64>| {
+                point(self.minimum(near.clone(), Some((aim, target, stiffness)), &[]))
+            },
+            // A value that moves little may be determined far better than to first order, such as the force of a
+            // load of greatest width.
+            is_stationary: |before: &ProfilePoint<_>, after: &ProfilePoint<_>, way: f64| {
+                way.abs() > 8.0 * step.abs() && (after.value - before.value).abs() < 1e-9 * step.abs()
+            },
+        };
+        profile.end(point(self.best.clone()), 2.0 * step).filter(|end| !self.is_at_edge(aim, &end.load))
     }
 
     /// At an end of the centre's range the value is unbounded: a narrower load could be nearer to the edge,

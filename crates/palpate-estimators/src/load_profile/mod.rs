@@ -21,6 +21,7 @@ mod cumulative;
 mod even_loads;
 mod patch_number;
 mod patches;
+mod profile_likelihood;
 mod smoothness;
 
 pub use cells::Cells;
