@@ -4,6 +4,7 @@
 mod baseline;
 mod clock;
 mod error;
+mod noise;
 mod rest;
 mod state;
 
@@ -287,7 +288,8 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             self.rest.add(reading, self.baseline.values.as_ref(), status, self.time_constant, length);
         if course == Course::AtRest {
             if status != Status::NoContact || self.rest.has_moved(self.baseline.values.as_ref()) {
-                self.baseline.set_level(self.rest.rest(), self.rest.rested());
+                let (mean, readings) = self.rest.rest();
+                self.baseline.set_level(mean, readings);
             } else {
                 self.baseline.shorten_level_memory();
             }
@@ -365,7 +367,7 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
             return;
         }
         // The beginning of a touch resembles a release, but its readings are not steady.
-        if runs.negative_contact >= LET_GO && self.rest.stays() {
+        if runs.negative_contact >= LET_GO && self.rest.is_steady() {
             self.restart_at(reading);
             return;
         }

@@ -1,5 +1,6 @@
 //! Rest after a touch: steady readings that are small compared with it.
 
+use super::noise::NoiseEstimate;
 use super::{LET_GO, run_length};
 use crate::Status;
 
@@ -9,7 +10,6 @@ const AT_REST: u32 = 2 * LET_GO;
 const AT_REST_S: f64 = 0.1;
 const UNTOUCHED: u32 = 10 * AT_REST;
 const UNTOUCHED_S: f64 = 10.0 * AT_REST_S;
-const NOISE_KNOWN: u32 = 20;
 /// Largest residue as a share of the touch: gauges on elastic surfaces have 3 % of hysteresis, and as much
 /// creep.
 const RESIDUE: f64 = 0.05;
@@ -41,54 +41,89 @@ impl RestLength {
     }
 }
 
+/// Size of a touch: the greatest size that [`LET_GO`] consecutive readings reach, as a squared distance from
+/// the baseline over the noise.
+#[derive(Clone, Debug, PartialEq)]
+struct Touch {
+    readings: u32,
+    recent: [f64; LET_GO as usize],
+    size: f64,
+}
+
+impl Touch {
+    const NONE: Self = Self { readings: 0, recent: [0.0; LET_GO as usize], size: 0.0 };
+
+    fn add(&mut self, size: f64) {
+        self.recent[(self.readings % LET_GO) as usize] = size;
+        self.readings = self.readings.saturating_add(1);
+        if self.is_certain() {
+            self.size = self.recent.iter().copied().fold(f64::INFINITY, f64::min).max(self.size);
+        }
+    }
+
+    /// False where noise may have caused a false alarm.
+    fn is_certain(&self) -> bool {
+        self.readings >= LET_GO
+    }
+}
+
+/// Mean of steady consecutive readings.
+#[derive(Clone, Debug, PartialEq)]
+struct SteadyMean<B> {
+    mean: B,
+    readings: u32,
+}
+
+impl<B: AsRef<[f64]> + AsMut<[f64]>> SteadyMean<B> {
+    /// Adds a reading to the mean; one that `is_steady` excludes begins a new mean.
+    fn add(&mut self, reading: &[f64], is_steady: bool) {
+        self.readings = run_length(self.readings, self.readings > 0 && is_steady).max(1);
+        let share = 1.0 / f64::from(self.readings);
+        for (mean, value) in self.mean.as_mut().iter_mut().zip(reading) {
+            *mean += share * (value - *mean);
+        }
+    }
+}
+
+/// Finds the rest after a touch.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct RestWatch<B> {
-    /// Variance of each channel about the baseline.
-    noise: B,
-    readings: u32,
-    sizes: [f64; LET_GO as usize],
-    touched: u32,
-    /// Greatest size of [`LET_GO`] consecutive readings.
-    touch_size: f64,
-    rest: B,
-    rested: u32,
+    noise: NoiseEstimate<B>,
+    touch: Touch,
+    rest: SteadyMean<B>,
+    /// Run of untouched readings since the touch.
     untouched: u32,
 }
 
 impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> RestWatch<B> {
-    pub fn new(zero: &B) -> Self {
-        let mut noise = zero.clone();
-        noise.as_mut().fill(0.0);
+    pub fn new(baseline: &B) -> Self {
+        let mut zeros = baseline.clone();
+        zeros.as_mut().fill(0.0);
         Self {
-            rest: noise.clone(),
-            noise,
-            readings: 0,
-            sizes: [0.0; LET_GO as usize],
-            touched: 0,
-            touch_size: 0.0,
-            rested: 0,
+            rest: SteadyMean { mean: zeros.clone(), readings: 0 },
+            noise: NoiseEstimate::new(zeros),
+            touch: Touch::NONE,
             untouched: 0,
         }
     }
 
-    pub fn rest(&self) -> &[f64] {
-        self.rest.as_ref()
+    /// Mean of the rest, and its number of readings.
+    pub fn rest(&self) -> (&[f64], u32) {
+        (self.rest.mean.as_ref(), self.rest.readings)
     }
 
+    /// True where the rest is further from the baseline than a reading by noise on average.
     pub fn has_moved(&self, baseline: &[f64]) -> bool {
-        self.distance(self.rest(), baseline) > baseline.len() as f64
+        self.noise.square_distance(self.rest.mean.as_ref(), baseline) > baseline.len() as f64
     }
 
-    pub fn rested(&self) -> u32 {
-        self.rested
-    }
-
-    pub fn stays(&self) -> bool {
-        self.readings < NOISE_KNOWN || self.rested >= LET_GO
+    /// True for steady readings, or an unknown noise.
+    pub fn is_steady(&self) -> bool {
+        !self.noise.is_known() || self.rest.readings >= LET_GO
     }
 
     pub fn forget_touch(&mut self) {
-        (self.touched, self.touch_size, self.rested, self.untouched) = (0, 0.0, 0, 0);
+        (self.touch, self.rest.readings, self.untouched) = (Touch::NONE, 0, 0);
     }
 
     pub fn add(
@@ -100,32 +135,24 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> RestWatch<B> {
         length: RestLength,
     ) -> Course {
         let is_untouched = status == Status::NoContact;
-        if is_untouched && self.touched == 0 {
-            self.learn_noise(reading, baseline, time_constant);
+        if is_untouched && self.touch.readings == 0 {
+            self.noise.add(reading, baseline, time_constant);
         }
-        if self.readings < NOISE_KNOWN {
+        if !self.noise.is_known() {
             return Course::Steady;
         }
-        let size = self.distance(reading, baseline);
-        if is_untouched {
-            if self.touched < LET_GO {
-                // Noise caused a false alarm.
-                self.forget_touch();
-                return Course::Steady;
-            }
-            self.untouched = self.untouched.saturating_add(1);
-        } else {
-            self.untouched = 0;
-            self.sizes[(self.touched % LET_GO) as usize] = size;
-            self.touched = self.touched.saturating_add(1);
-            if self.touched >= LET_GO {
-                self.touch_size =
-                    self.sizes.iter().copied().fold(f64::INFINITY, f64::min).max(self.touch_size);
-            }
+        if is_untouched && !self.touch.is_certain() {
+            self.forget_touch();
+            return Course::Steady;
         }
-        self.follow_rest(reading);
-        let is_residue = is_untouched || size <= RESIDUE * RESIDUE * self.touch_size;
-        if (is_residue && self.rested >= length.stays) || self.untouched >= length.untouched {
+        let size = self.noise.square_distance(reading, baseline);
+        if !is_untouched {
+            self.touch.add(size);
+        }
+        self.untouched = run_length(self.untouched, is_untouched);
+        self.rest.add(reading, self.continues_rest(reading));
+        let is_residue = is_untouched || size <= RESIDUE * RESIDUE * self.touch.size;
+        if (is_residue && self.rest.readings >= length.stays) || self.untouched >= length.untouched {
             Course::AtRest
         } else if is_untouched {
             Course::Settling
@@ -134,38 +161,10 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> RestWatch<B> {
         }
     }
 
-    fn follow_rest(&mut self, reading: &[f64]) {
-        let channels = reading.len() as f64;
+    fn continues_rest(&self, reading: &[f64]) -> bool {
+        let (rest, readings) = self.rest();
         // For any number of channels, noise is within 2·channels + 8 in 99.7 % of readings.
-        let by_noise = (2.0 * channels + 8.0) * (1.0 + 1.0 / f64::from(self.rested.max(1)));
-        let stays =
-            self.distance(reading, self.rest.as_ref()) <= by_noise.max(CHANGE * CHANGE * self.touch_size);
-        self.rested = run_length(self.rested, self.rested > 0 && stays).max(1);
-        let share = 1.0 / f64::from(self.rested);
-        for (rest, value) in self.rest.as_mut().iter_mut().zip(reading) {
-            *rest += share * (value - *rest);
-        }
-    }
-
-    fn learn_noise(&mut self, reading: &[f64], baseline: &[f64], time_constant: u32) {
-        self.readings = self.readings.saturating_add(1).min(time_constant);
-        let share = 1.0 / f64::from(self.readings);
-        for ((noise, value), baseline) in self.noise.as_mut().iter_mut().zip(reading).zip(baseline) {
-            let deviation = value - baseline;
-            *noise += share * (deviation * deviation - *noise);
-        }
-    }
-
-    /// Σ (a − b)² / variance. A channel without noise, as from a coarse converter, gets the mean variance.
-    fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
-        let noise = self.noise.as_ref();
-        let mean = noise.iter().sum::<f64>() / noise.len().max(1) as f64;
-        let variance = |own: f64| match (own > 0.0, mean > 0.0) {
-            (true, _) => own,
-            (false, true) => mean,
-            (false, false) => 1.0,
-        };
-        let channels = a.iter().zip(b).zip(noise);
-        channels.map(|((a, b), noise)| (a - b) * (a - b) / variance(*noise)).sum()
+        let by_noise = (2.0 * reading.len() as f64 + 8.0) * (1.0 + 1.0 / f64::from(readings.max(1)));
+        self.noise.square_distance(reading, rest) <= by_noise.max(CHANGE * CHANGE * self.touch.size)
     }
 }
