@@ -36,7 +36,7 @@ class ErrorsByPosition(Result):
     mean, median, p95, rmse, max : ndarray of float64
         Their errors, in metres: of the shape (positions).
     coverage : ndarray of float64
-        Share of their 95 % regions that hold the contact, NaN where the locator has none: of the shape (positions).
+        Share of their true coordinates (x; on a plane x and y) within the 95 % intervals, NaN where the locator has none: of the shape (positions).
     """
 
     x: Floats
@@ -86,7 +86,7 @@ class Comparison(Result):
     effective_length : ndarray of float64
         Share of the contacts whose error is within the tolerance.
     coverage : ndarray of float64
-        Share of the 95 % regions that hold their contact, NaN where there are none.
+        Share of the true coordinates (x; on a plane x and y) within their 95 % intervals, NaN where there are none.
     interval_score : ndarray of float64
         Mean interval score of the 95 % intervals, in metres.
     force_mean, force_coverage : ndarray of float64

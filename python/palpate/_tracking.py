@@ -191,7 +191,7 @@ class Track(Result):
         Estimate of each reading by itself.
     errors : dict or None
         Where the truth is known: "single" and "track", mean errors in metres of readings by themselves and of the track, and their "ratio";
-        "single_covered", "track_covered", shares of the 95 % intervals that hold the contact; "single_number_right", "track_number_right", shares
+        "single_covered", "track_covered", shares of the true coordinates within their 95 % intervals; "single_number_right", "track_number_right", shares
         of the readings with as many contacts as touch; "readings", "tracked".
     """
 
