@@ -3,6 +3,7 @@
 use palpate_core::ContactEstimate;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::mean;
 
 /// Coordinates of a position within their 95 % intervals ([`Uncertainty::x_95_m`], and on planes
 /// [`Uncertainty::y_95_m`]).
@@ -42,9 +43,7 @@ impl CoveredCoordinates {
 
     /// Share of the coordinates: 0 or 1 on lines; 0, ½ or 1 on planes.
     pub fn share(self) -> f64 {
-        let (covered, count) =
-            self.coordinates().fold((0, 0), |(covered, count), of| (covered + u32::from(of), count + 1));
-        f64::from(covered) / f64::from(count)
+        mean(self.coordinates().map(f64::from))
     }
 }
 

@@ -1,5 +1,6 @@
 use super::*;
 use crate::fit::Fit;
+use palpate_core::{ContactEstimate, Uncertainty};
 use palpate_numerics::watch::Cancelled;
 
 /// Ten contacts along 100 mm; the error of the k-th is k/2 mm to the right.
@@ -149,4 +150,30 @@ fn positions_that_count_from_the_other_end_or_along_other_axes_are_recognised() 
     assert_eq!(mapped(plane, &|at| other_side(other_end(at))), Some((SurfaceMap::Turned, true)));
     let exchanged = |at: Position| Position { x_m: at.y_m, y_m: at.x_m };
     assert_eq!(mapped(plane, &exchanged), Some((SurfaceMap::Exchanged, true)));
+}
+
+#[test]
+fn coverage_on_a_plane_is_the_mean_of_both_coordinates() {
+    let extent = Extent::plane(0.3, 0.2).unwrap();
+    let estimate = Estimate::of_contact(
+        ContactEstimate {
+            position: Position { x_m: 0.1, y_m: 0.1 },
+            force_n: None,
+            uncertainty: Some(Uncertainty {
+                covariance: [2.6e-5, 2.5e-5, 0.0, 2.6e-5, 0.0, 0.0],
+                x_95_m: (0.09, 0.11),
+                y_95_m: (0.09, 0.11),
+                force_95_n: None,
+            }),
+        },
+        Status::Located,
+    );
+    let covered =
+        |x_m: f64, y_m: f64| EvaluatedContact::of_contact(Position { x_m, y_m }, None, &estimate, extent);
+    // The second place is far outside the ellipse of these correlated errors.
+    let located = vec![covered(0.1, 0.1), covered(0.109, 0.091), covered(0.12, 0.1), covered(0.2, 0.2)];
+    let shares: Vec<f64> =
+        located.iter().filter_map(|at| at.covered.map(CoveredCoordinates::share)).collect();
+    assert_eq!(shares, [1.0, 1.0, 0.5, 0.0]);
+    assert_eq!(Evaluation { extent, located }.coverage_percent(), Some(62.5));
 }
