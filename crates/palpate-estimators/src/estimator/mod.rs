@@ -40,11 +40,10 @@ use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Ma
 use crate::fit_memo::FitMemo;
 use crate::gaussian_process::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
 use crate::influence::{
-    BeamLikelihood, ForceLinearLocator, Influence, InfluenceFitError, InfluenceLocator, InfluencesAtNodes,
-    PlateLikelihood, Structure,
+    BeamLikelihood, ForceLinearLocator, Influence, InfluenceFitError,
+    InfluenceLocator, InfluencesAtNodes, PlateLikelihood, Structure,
 };
 use crate::likelihood::{Likelihood, UntouchedSurface};
-use crate::load_profile::LoadChannel;
 use crate::neighbours::{Neighbours, NeighboursFitError, NeighboursLocator};
 use crate::network::{
     LevenbergMarquardt, LevenbergMarquardtFitError, LevenbergMarquardtLocator, Network, NetworkFitError,
@@ -57,6 +56,7 @@ use crate::setup::{Setup, SetupError};
 use crate::status::FalseAlarmRate;
 
 use palpate_mechanics::surface::SurfaceSpec;
+use palpate_numerics::NotPositiveDefinite;
 use palpate_numerics::watch::{Cancelled, Watch};
 
 /// Common types of a list of estimators.
@@ -384,7 +384,7 @@ pub struct NoBaseline {
 }
 
 /// Error of disabling a channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LeaveOutError {
     /// Channel that does not exist.
     #[error("channel {channel} does not exist; the locator has channels 1 to {channels}")]
@@ -395,14 +395,19 @@ pub enum LeaveOutError {
         channels: usize,
     },
     /// Method that needs every channel.
-    #[error("a locator of kind `{kind}` needs every channel: fit it again without the dead one")]
+    #[error("a locator of kind `{kind}` needs every channel: fit it again without the channel")]
     Needed {
         /// Kind of the locator.
         kind: &'static str,
     },
-    /// Last enabled channel.
-    #[error("it is the last living channel; at least 1 must be left")]
+    /// Channel without which contacts are unidentifiable.
+    #[error("too few channels would remain in use")]
     NoneLeft,
+    /// Noise covariance from which the others' does not follow.
+    #[error(
+        "the noise of the other channels does not follow from the locator ({0}): fit it again without the channel"
+    )]
+    Noise(#[from] NotPositiveDefinite),
 }
 
 impl Locator {
@@ -434,10 +439,7 @@ impl Locator {
         let kind = self.kind();
         match &mut self.method {
             Method::Influence(influence) => {
-                if matches!(influence, InfluenceLocator::ForceLinear(_) | InfluenceLocator::Measured(_)) {
-                    return Err(LeaveOutError::Needed { kind });
-                }
-                if !influence.leave_out(channel) {
+                if !influence.leave_out(channel)? {
                     return Err(LeaveOutError::NoneLeft);
                 }
             }
@@ -627,10 +629,12 @@ impl Locator {
 }
 
 impl Locator {
-    /// Sensors of a distributed load, by fitted influence functions or by mechanics.
+    /// Sensors of a distributed load, by learnt influence functions, offsets and noise, or, for an estimator
+    /// without them, by mechanics.
     ///
     /// # Errors
-    /// [`LoadSensorsError`] without a model, noise or enabled sensors.
+    /// [`LoadSensorsError`] without influence functions, noise or enabled sensors, and for readings that are not
+    /// proportional to the force.
     pub fn load_sensors(&self) -> Result<LoadSensors<'_>, LoadSensorsError> {
         self.load_sensors_watched(Watch::NONE)
     }
@@ -641,12 +645,9 @@ impl Locator {
     /// As there, and [`LoadSensors::new_watched`].
     pub fn load_sensors_watched(&self, watch: Watch) -> Result<LoadSensors<'_>, LoadSensorsError> {
         match &self.method {
-            Method::Influence(InfluenceLocator::Beam(beam)) => {
-                let channels = beam.influences().map(|channel| {
-                    let (influence, offset, noise_sd) = channel?;
-                    Some(LoadChannel { influence: Arc::new(influence), offset, noise_sd })
-                });
-                Ok(LoadSensors { extent: self.setup.surface().extent(), channels: channels.collect() })
+            Method::Influence(influence) => {
+                let channels = influence.influences()?;
+                Ok(LoadSensors { extent: self.setup.surface().extent(), channels })
             }
             _ => LoadSensors::from_setup_watched(&self.setup, watch),
         }

@@ -34,6 +34,8 @@ mod edges;
 mod ends;
 mod few;
 mod force_range;
+mod loads;
+mod missing_channel;
 mod noise;
 mod one_weight;
 mod saturating;
