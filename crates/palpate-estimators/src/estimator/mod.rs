@@ -40,10 +40,10 @@ use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Ma
 use crate::fit_memo::FitMemo;
 use crate::gaussian_process::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
 use crate::influence::{
-    BeamLikelihood, ForceLinearLocator, Influence, InfluenceFitError,
+    BeamLikelihood, ForceLinearLikelihood, ForceLinearLocator, Influence, InfluenceFitError,
     InfluenceLocator, InfluencesAtNodes, PlateLikelihood, Structure,
 };
-use crate::likelihood::{Likelihood, UntouchedSurface};
+use crate::likelihood::{Likelihood, LocatorChecks};
 use crate::neighbours::{Neighbours, NeighboursFitError, NeighboursLocator};
 use crate::network::{
     LevenbergMarquardt, LevenbergMarquardtFitError, LevenbergMarquardtLocator, Network, NetworkFitError,
@@ -663,16 +663,22 @@ pub struct Tracking {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NotTrackable {
     /// Method without a likelihood.
-    #[error("a moving contact is followed by an influence locator of a surface with a model; this one is of kind `{kind}`{}", if *measured { ", on a measured surface" } else { "" })]
+    #[error("a moving contact is tracked by a locator of kind `influence`; this one is of kind `{kind}`")]
     Kind {
         /// Kind of the locator.
         kind: &'static str,
-        /// True for a surface without a model.
-        measured: bool,
     },
+    /// Readings of the free structure.
+    #[error(
+        "a moving contact is tracked where readings follow the force; this locator has the structure `free`: record the force of every press, and fit the structure `force-linear`"
+    )]
+    Free,
+    /// Unknown force with a prior mean of 0 or less.
+    #[error("tracked contacts press; the calibration forces have a mean of 0 N or less")]
+    Pull,
     /// Surface with an unknown first mode.
     #[error(
-        "inertia is modelled only for a beam on two simple supports; this surface has other supports: track it without a natural frequency"
+        "inertia is modelled only for a beam on two simple supports: track this surface without a natural frequency"
     )]
     Mode,
 }
@@ -693,28 +699,24 @@ impl Locator {
         if config.swing.is_some() && !matches!(self.setup.surface(), SurfaceSpec::Beam(_)) {
             return Err(NotTrackable::Mode);
         }
-        let untouched = UntouchedSurface::without_walk(
+        let checks = LocatorChecks::without_walk(
             self.untouched_scatter.clone(),
             self.untouched_drift.clone(),
             &self.noise_sd().unwrap_or_default(),
-        );
-        match &self.method {
-            Method::Influence(InfluenceLocator::Beam(beam)) => {
-                let likelihood = BeamLikelihood::new(beam)
-                    .with_untouched(untouched)
-                    .with_interval_check(self.interval_check);
-                Ok(Tracking { likelihood: Arc::new(likelihood) })
+        )
+        .with_intervals(self.interval_check);
+        let Method::Influence(influence) = &self.method else {
+            return Err(NotTrackable::Kind { kind: self.kind() });
+        };
+        let likelihood: Arc<dyn Likelihood> = match influence {
+            InfluenceLocator::Beam(beam) => Arc::new(BeamLikelihood::new(beam).with_checks(checks)),
+            InfluenceLocator::Plane(plane) => Arc::new(PlateLikelihood::new(plane).with_checks(checks)),
+            InfluenceLocator::ForceLinear(linear) => {
+                let likelihood = ForceLinearLikelihood::new(linear).ok_or(NotTrackable::Pull)?;
+                Arc::new(likelihood.with_checks(checks))
             }
-            Method::Influence(InfluenceLocator::Plane(plane)) => {
-                let likelihood = PlateLikelihood::new(plane)
-                    .with_untouched(untouched)
-                    .with_interval_check(self.interval_check);
-                Ok(Tracking { likelihood: Arc::new(likelihood) })
-            }
-            method => Err(NotTrackable::Kind {
-                kind: self.kind(),
-                measured: matches!(method, Method::Influence(_)),
-            }),
-        }
+            InfluenceLocator::Measured(_) => return Err(NotTrackable::Free),
+        };
+        Ok(Tracking { likelihood })
     }
 }

@@ -24,7 +24,7 @@ pub use at_nodes::InfluencesAtNodes;
 pub use beam::{BeamLikelihood, BeamLocator, FittedInfluence, InfluenceTable, Scratch};
 pub use config::{ForceBelief, Influence, InfluenceFitError, InfluenceSource, Structure};
 pub(crate) use force_linear::is_unsaturated;
-pub use force_linear::{DriftCourse, ForceLinearLocator, Scatter, Source};
+pub use force_linear::{DriftCourse, ForceLinearLikelihood, ForceLinearLocator, Scatter, Source};
 pub use grid::Axis;
 pub use loads::{LoadChannel, NotProportional};
 pub use noise::Whitening;

@@ -34,6 +34,7 @@ mod edges;
 mod ends;
 mod few;
 mod force_range;
+mod likelihood;
 mod loads;
 mod missing_channel;
 mod noise;
