@@ -1,8 +1,16 @@
 //! Loads over a length of a strip or an area of a plate.
 
 use super::*;
+use crate::estimator::{Estimator, Locator, Method};
 use crate::load_profile::{LoadProfile, LoadSensorsError, Profiler};
 use palpate_mechanics::surface::InfluenceFunction;
+
+fn locator(bench: &Bench) -> Locator {
+    let estimator =
+        Estimator::Influence(Influence { structure: Structure::ForceLinear, ..Influence::default() });
+    let (setup, recording) = (bench.setup(), bench.recording());
+    estimator.fit_without_interval_check(FitTask::new(&setup, &recording)).unwrap()
+}
 
 /// Profile of the noisy reading of a load that is spread evenly over a rectangle.
 fn profile(bench: &mut Bench, [from, to]: [Position; 2], force_n: f64) -> LoadProfile {
@@ -18,9 +26,7 @@ fn profile(bench: &mut Bench, [from, to]: [Position; 2], force_n: f64) -> LoadPr
         bench.offsets[c] + force_n * mean(points.iter().map(|f| f[c])) + noise
     });
     let reading: Vec<f64> = reading.collect();
-    let (setup, recording) = (bench.setup(), bench.recording());
-    let locator = Influence::default().fit(&setup, &recording).unwrap().into_locator();
-    Profiler::new(locator.load_sensors().unwrap()).profile(&reading).unwrap()
+    Profiler::new(locator(bench).load_sensors().unwrap()).profile(&reading).unwrap()
 }
 
 #[test]
@@ -64,14 +70,12 @@ fn assert_slopes(function: &dyn InfluenceFunction, at: Position, node_m: f64) {
 
 #[test]
 fn readings_that_are_not_proportional_to_the_force_have_no_load_profile() {
-    let bench = Bench::strip(2, 75, 25);
-    let (setup, recording) = (bench.setup(), bench.recording());
-    let mut fitted = Influence::default().fit(&setup, &recording).unwrap();
-    let InfluenceLocator::ForceLinear(linear) = &mut fitted.method else { panic!("{:?}", fitted.method) };
-    linear.stored.prior.response = 1.2;
-    let Err(error) = fitted.into_locator().load_sensors() else {
-        panic!("the readings are not proportional")
+    let mut locator = locator(&Bench::strip(2, 75, 25));
+    let Method::Influence(InfluenceLocator::ForceLinear(linear)) = &mut locator.method else {
+        panic!("{:?}", locator.method)
     };
+    linear.stored.prior.response = 1.2;
+    let Err(error) = locator.load_sensors() else { panic!("the readings are not proportional") };
     assert!(matches!(error, LoadSensorsError::NotProportional(_)), "{error:?}");
     assert!(error.to_string().ends_with("grow with its power 1.20"), "{error}");
 }
