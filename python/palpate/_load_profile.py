@@ -178,7 +178,7 @@ def load_profile(
     Parameters
     ----------
     bench : Setup, Rig or Locator
-        The bench, by its mechanics; or an influence locator of a line, by the influence functions, offsets and noise that it learnt.
+        The bench, by its mechanics; or an influence locator, by the influence functions, offsets and noise that it learnt. On a surface without a model its readings must be proportional to the force.
     readings : array_like
         In SI units: one reading of the shape (channels), or many of the shape (readings, channels).
     loads : UniformLoad or sequence of UniformLoad, optional
@@ -194,7 +194,7 @@ def load_profile(
     Raises
     ------
     PalpateError
-        For a surface without a model, sensors without noise, and values that are not finite.
+        For a surface without a model or influence locator, readings that are not proportional to the force, sensors without noise, and values that are not finite.
 
     Examples
     --------

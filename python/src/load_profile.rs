@@ -122,7 +122,10 @@ impl From<palpate::numerics::watch::Cancelled> for ProfileFailure {
 
 fn complaint(error: &LoadSensorsError) -> PyErr {
     let help = match error {
-        LoadSensorsError::NoModel => "give a surface with a model, such as a `Beam`",
+        LoadSensorsError::NoModel => {
+            "give a surface with a model, such as a `Beam`, or a locator of `Influence`"
+        }
+        LoadSensorsError::NotProportional(error) => error.help(),
         LoadSensorsError::Noise(error) => error.help(),
         LoadSensorsError::Surface(error) => error.help(),
     };

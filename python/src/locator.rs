@@ -195,7 +195,7 @@ impl Locator {
 
     /// Follow moving contacts through readings in time: one contact, or on a line up to two, with their speed and force.
     ///
-    /// The locator is an influence locator of a surface with a model; two contacts are followed where its estimator has ``contacts=2``.
+    /// The locator is an influence locator of any structure but ``free``; two contacts are followed where its estimator has ``contacts=2``.
     ///
     /// Parameters
     /// ----------
@@ -248,7 +248,7 @@ impl Locator {
     /// Raises
     /// ------
     /// PalpateError
-    ///     For a locator that cannot follow: it must be an influence locator of a surface with a model.
+    ///     For a locator that cannot track: it must be an influence locator of any structure but ``free``.
     ///
     /// Examples
     /// --------

@@ -18,13 +18,15 @@ pub struct CalibrationVariance {
     pub force_n2: f64,
 }
 
+/// Scatter and drift of untouched rows, and coverage of intervals, by a locator's recording.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct UntouchedSurface {
-    pub scatter: Option<UntouchedScatter>,
-    pub drift: Option<UntouchedDrift>,
+pub struct LocatorChecks {
+    scatter: Option<UntouchedScatter>,
+    drift: Option<UntouchedDrift>,
+    intervals: Option<IntervalCheck>,
 }
 
-impl UntouchedSurface {
+impl LocatorChecks {
     /// Where a tracked walk dominates the scatter, the noise of two readings replaces it; walks of single
     /// channels are too uncertain to subtract.
     pub fn without_walk(
@@ -47,11 +49,13 @@ impl UntouchedSurface {
             }
             scatter
         });
-        Self { scatter, drift }
+        Self { scatter, drift, intervals: None }
     }
 
-    pub fn contains(&self, reading: &[f64]) -> bool {
-        self.scatter.as_ref().is_some_and(|scatter| scatter.contains(reading))
+    /// Replaces the interval check.
+    #[must_use]
+    pub fn with_intervals(self, intervals: Option<IntervalCheck>) -> Self {
+        Self { intervals, ..self }
     }
 }
 
@@ -78,17 +82,36 @@ pub trait Likelihood: Send + Sync {
     /// Estimates contacts from one reading.
     fn single_estimate(&self, reading: &[f64]) -> Estimate;
 
+    /// Checks of the locator; `None` without any.
+    fn checks(&self) -> Option<&LocatorChecks> {
+        None
+    }
+
     /// True within the residue of touches.
-    fn is_residue(&self, reading: &[f64]) -> bool;
+    fn is_residue(&self, reading: &[f64]) -> bool {
+        self.checks()
+            .and_then(|checks| checks.scatter.as_ref())
+            .is_some_and(|scatter| scatter.contains(reading))
+    }
 
     /// Interval check.
-    fn interval_check(&self) -> Option<&IntervalCheck>;
+    fn interval_check(&self) -> Option<&IntervalCheck> {
+        self.checks()?.intervals.as_ref()
+    }
 
     /// Drift of untouched rows.
-    fn untouched_drift(&self) -> Option<&UntouchedDrift>;
+    fn untouched_drift(&self) -> Option<&UntouchedDrift> {
+        self.checks()?.drift.as_ref()
+    }
 
     /// Extent of the surface.
     fn extent(&self) -> Extent;
+
+    /// Ranges of tracked positions along and across, in metres.
+    fn position_ranges_m(&self) -> [(f64, f64); 2] {
+        let extent = self.extent();
+        [(0.0, extent.length_m()), (0.0, extent.width_m().unwrap_or(0.0))]
+    }
 
     /// Known force of contacts.
     fn known_force_n(&self) -> Option<f64>;

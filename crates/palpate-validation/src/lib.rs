@@ -19,6 +19,7 @@ mod machine;
 mod measured_edges;
 mod mechanics;
 mod moving_contacts;
+mod moving_without_model;
 mod one_weight;
 mod parallel;
 mod plate_edges;

@@ -17,10 +17,10 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-const BEAM: &str = include_str!("../../../examples/moving-load.toml");
-const PLATE: &str = include_str!("../../../examples/moving-plate.toml");
+pub const BEAM: &str = include_str!("../../../examples/moving-load.toml");
+pub const PLATE: &str = include_str!("../../../examples/moving-plate.toml");
 /// Offset of the seeds of moving contacts from calibration seeds.
-const MOVING: u64 = 1000;
+pub const MOVING: u64 = 1000;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Surface {

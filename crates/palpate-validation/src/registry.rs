@@ -3,8 +3,8 @@
 use crate::experiment::Experiment;
 use crate::{
     beam_ends, comparisons, designs, drift_and_creep, false_alarms, influence_sources, load_patches,
-    load_profiles, measured_edges, mechanics, moving_contacts, one_weight, plate_edges, plate_limit,
-    real_benches, statuses, strips, studies, weighed,
+    load_profiles, measured_edges, mechanics, moving_contacts, moving_without_model, one_weight, plate_edges,
+    plate_limit, real_benches, statuses, strips, studies, weighed,
 };
 use anyhow::{Context, Result};
 
@@ -29,6 +29,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     strips::FEW,
     weighed::EXPERIMENT,
     moving_contacts::EXPERIMENT,
+    moving_without_model::EXPERIMENT,
     drift_and_creep::EXPERIMENT,
     studies::PRESS_SPACING,
     studies::SENSING_POSITIONS,

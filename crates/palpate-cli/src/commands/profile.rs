@@ -78,7 +78,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 fn sensors_error(error: LoadSensorsError, path: &Path) -> UserError {
     let help = match error {
-        LoadSensorsError::NoModel => "give a surface with a model, such as `kind = \"beam\"`",
+        LoadSensorsError::NoModel => {
+            "give a surface with a model, such as `kind = \"beam\"`, or a locator that `palpate fit` fits with `kind = \"influence\"`"
+        }
+        LoadSensorsError::NotProportional(error) => error.help(),
         LoadSensorsError::Noise(ref error) => error.help(),
         LoadSensorsError::Surface(ref error) => error.help(),
     };

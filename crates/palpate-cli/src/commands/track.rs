@@ -39,7 +39,7 @@ Examples:
 #[derive(clap::Args)]
 #[command(after_long_help = EXAMPLES)]
 pub struct Arguments {
-    /// Influence locator of a surface with a model
+    /// Influence locator whose readings follow the force
     locator: PathBuf,
     /// CSV file of readings, `-` for stdin [default: stdin]
     readings: Option<PathBuf>,

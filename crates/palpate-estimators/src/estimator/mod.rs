@@ -40,11 +40,10 @@ use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Ma
 use crate::fit_memo::FitMemo;
 use crate::gaussian_process::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
 use crate::influence::{
-    BeamLikelihood, ForceLinearLocator, Influence, InfluenceFitError, InfluenceLocator, InfluencesAtNodes,
-    PlateLikelihood, Structure,
+    BeamLikelihood, ForceLinearLikelihood, ForceLinearLocator, Influence, InfluenceFitError,
+    InfluenceLocator, InfluencesAtNodes, PlateLikelihood, Structure,
 };
-use crate::likelihood::{Likelihood, UntouchedSurface};
-use crate::load_profile::LoadChannel;
+use crate::likelihood::{Likelihood, LocatorChecks};
 use crate::neighbours::{Neighbours, NeighboursFitError, NeighboursLocator};
 use crate::network::{
     LevenbergMarquardt, LevenbergMarquardtFitError, LevenbergMarquardtLocator, Network, NetworkFitError,
@@ -57,6 +56,7 @@ use crate::setup::{Setup, SetupError};
 use crate::status::FalseAlarmRate;
 
 use palpate_mechanics::surface::SurfaceSpec;
+use palpate_numerics::NotPositiveDefinite;
 use palpate_numerics::watch::{Cancelled, Watch};
 
 /// Common types of a list of estimators.
@@ -384,7 +384,7 @@ pub struct NoBaseline {
 }
 
 /// Error of disabling a channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LeaveOutError {
     /// Channel that does not exist.
     #[error("channel {channel} does not exist; the locator has channels 1 to {channels}")]
@@ -395,14 +395,19 @@ pub enum LeaveOutError {
         channels: usize,
     },
     /// Method that needs every channel.
-    #[error("a locator of kind `{kind}` needs every channel: fit it again without the dead one")]
+    #[error("a locator of kind `{kind}` needs every channel: fit it again without the channel")]
     Needed {
         /// Kind of the locator.
         kind: &'static str,
     },
-    /// Last enabled channel.
-    #[error("it is the last living channel; at least 1 must be left")]
+    /// Channel without which contacts are unidentifiable.
+    #[error("too few channels would remain in use")]
     NoneLeft,
+    /// Noise covariance from which the others' does not follow.
+    #[error(
+        "the noise of the other channels does not follow from the locator ({0}): fit it again without the channel"
+    )]
+    Noise(#[from] NotPositiveDefinite),
 }
 
 impl Locator {
@@ -434,10 +439,7 @@ impl Locator {
         let kind = self.kind();
         match &mut self.method {
             Method::Influence(influence) => {
-                if matches!(influence, InfluenceLocator::ForceLinear(_) | InfluenceLocator::Measured(_)) {
-                    return Err(LeaveOutError::Needed { kind });
-                }
-                if !influence.leave_out(channel) {
+                if !influence.leave_out(channel)? {
                     return Err(LeaveOutError::NoneLeft);
                 }
             }
@@ -627,10 +629,12 @@ impl Locator {
 }
 
 impl Locator {
-    /// Sensors of a distributed load, by fitted influence functions or by mechanics.
+    /// Sensors of a distributed load, by learnt influence functions, offsets and noise, or, for an estimator
+    /// without them, by mechanics.
     ///
     /// # Errors
-    /// [`LoadSensorsError`] without a model, noise or enabled sensors.
+    /// [`LoadSensorsError`] without influence functions, noise or enabled sensors, and for readings that are not
+    /// proportional to the force.
     pub fn load_sensors(&self) -> Result<LoadSensors<'_>, LoadSensorsError> {
         self.load_sensors_watched(Watch::NONE)
     }
@@ -641,12 +645,9 @@ impl Locator {
     /// As there, and [`LoadSensors::new_watched`].
     pub fn load_sensors_watched(&self, watch: Watch) -> Result<LoadSensors<'_>, LoadSensorsError> {
         match &self.method {
-            Method::Influence(InfluenceLocator::Beam(beam)) => {
-                let channels = beam.influences().map(|channel| {
-                    let (influence, offset, noise_sd) = channel?;
-                    Some(LoadChannel { influence: Arc::new(influence), offset, noise_sd })
-                });
-                Ok(LoadSensors { extent: self.setup.surface().extent(), channels: channels.collect() })
+            Method::Influence(influence) => {
+                let channels = influence.influences()?;
+                Ok(LoadSensors { extent: self.setup.surface().extent(), channels })
             }
             _ => LoadSensors::from_setup_watched(&self.setup, watch),
         }
@@ -662,16 +663,22 @@ pub struct Tracking {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NotTrackable {
     /// Method without a likelihood.
-    #[error("a moving contact is followed by an influence locator of a surface with a model; this one is of kind `{kind}`{}", if *measured { ", on a measured surface" } else { "" })]
+    #[error("a moving contact is tracked by a locator of kind `influence`; this one is of kind `{kind}`")]
     Kind {
         /// Kind of the locator.
         kind: &'static str,
-        /// True for a surface without a model.
-        measured: bool,
     },
+    /// Readings of the free structure.
+    #[error(
+        "a moving contact is tracked where readings follow the force; this locator has the structure `free`: record the force of every press, and fit the structure `force-linear`"
+    )]
+    Free,
+    /// Unknown force with a prior mean of 0 or less.
+    #[error("tracked contacts press; the calibration forces have a mean of 0 N or less")]
+    Pull,
     /// Surface with an unknown first mode.
     #[error(
-        "inertia is modelled only for a beam on two simple supports; this surface has other supports: track it without a natural frequency"
+        "inertia is modelled only for a beam on two simple supports: track this surface without a natural frequency"
     )]
     Mode,
 }
@@ -692,28 +699,24 @@ impl Locator {
         if config.swing.is_some() && !matches!(self.setup.surface(), SurfaceSpec::Beam(_)) {
             return Err(NotTrackable::Mode);
         }
-        let untouched = UntouchedSurface::without_walk(
+        let checks = LocatorChecks::without_walk(
             self.untouched_scatter.clone(),
             self.untouched_drift.clone(),
             &self.noise_sd().unwrap_or_default(),
-        );
-        match &self.method {
-            Method::Influence(InfluenceLocator::Beam(beam)) => {
-                let likelihood = BeamLikelihood::new(beam)
-                    .with_untouched(untouched)
-                    .with_interval_check(self.interval_check);
-                Ok(Tracking { likelihood: Arc::new(likelihood) })
+        )
+        .with_intervals(self.interval_check);
+        let Method::Influence(influence) = &self.method else {
+            return Err(NotTrackable::Kind { kind: self.kind() });
+        };
+        let likelihood: Arc<dyn Likelihood> = match influence {
+            InfluenceLocator::Beam(beam) => Arc::new(BeamLikelihood::new(beam).with_checks(checks)),
+            InfluenceLocator::Plane(plane) => Arc::new(PlateLikelihood::new(plane).with_checks(checks)),
+            InfluenceLocator::ForceLinear(linear) => {
+                let likelihood = ForceLinearLikelihood::new(linear).ok_or(NotTrackable::Pull)?;
+                Arc::new(likelihood.with_checks(checks))
             }
-            Method::Influence(InfluenceLocator::Plane(plane)) => {
-                let likelihood = PlateLikelihood::new(plane)
-                    .with_untouched(untouched)
-                    .with_interval_check(self.interval_check);
-                Ok(Tracking { likelihood: Arc::new(likelihood) })
-            }
-            method => Err(NotTrackable::Kind {
-                kind: self.kind(),
-                measured: matches!(method, Method::Influence(_)),
-            }),
-        }
+            InfluenceLocator::Measured(_) => return Err(NotTrackable::Free),
+        };
+        Ok(Tracking { likelihood })
     }
 }

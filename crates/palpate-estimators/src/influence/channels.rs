@@ -1,10 +1,13 @@
 //! Parameters of the channels of a locator with a model, besides the influence functions.
 
 use super::config::ForceBelief;
+use super::loads::LoadChannel;
 use crate::fit::LocatorFault;
 use crate::force_prior::{DECADE, ForceRange};
 use crate::status::FalseAlarmRate;
+use palpate_mechanics::surface::InfluenceFunction;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -33,6 +36,19 @@ impl Channels {
 
     pub fn noise_in_use(&self) -> Vec<Option<f64>> {
         self.noise_sd.iter().zip(&self.dead).map(|(sd, dead)| (!dead).then_some(*sd)).collect()
+    }
+
+    /// Influence functions of the channels with those in use, in their order; `None` for disabled channels.
+    pub fn influences<'a>(
+        &'a self,
+        in_use: impl Iterator<Item = Arc<dyn InfluenceFunction + 'a>>,
+    ) -> Vec<Option<LoadChannel<'a>>> {
+        let mut influences = vec![None; self.dead.len()];
+        for (channel, influence) in self.live().into_iter().zip(in_use) {
+            let (offset, noise_sd) = (self.offsets[channel], self.noise_sd[channel]);
+            influences[channel] = Some(LoadChannel { influence, offset, noise_sd });
+        }
+        influences
     }
 
     /// Upper bound of an unknown force: as stated, or [`DECADE`] times the calibration's.

@@ -11,7 +11,9 @@ mod inversion;
 mod lanes;
 pub(crate) mod learning;
 mod levenberg;
+mod loads;
 pub mod measured;
+mod missing_channel;
 mod moments;
 mod noise;
 mod plane;
@@ -22,8 +24,9 @@ pub use at_nodes::InfluencesAtNodes;
 pub use beam::{BeamLikelihood, BeamLocator, FittedInfluence, InfluenceTable, Scratch};
 pub use config::{ForceBelief, Influence, InfluenceFitError, InfluenceSource, Structure};
 pub(crate) use force_linear::is_unsaturated;
-pub use force_linear::{DriftCourse, ForceLinearLocator, Scatter, Source};
+pub use force_linear::{DriftCourse, ForceLinearLikelihood, ForceLinearLocator, Scatter, Source};
 pub use grid::Axis;
+pub use loads::{LoadChannel, NotProportional};
 pub use noise::Whitening;
 pub use plane::{PlaneLocator, PlaneScratch, PlaneTable, PlateLikelihood};
 
@@ -38,6 +41,7 @@ use measured::{MeasuredInfluence, MeasuredLocator};
 use palpate_core::Estimate;
 use palpate_mechanics::limit::CramerRaoBound;
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::NotPositiveDefinite;
 use serde::{Deserialize, Serialize};
 
 pub(crate) fn sizes_over_a_model(extent: Extent) -> [usize; 2] {
@@ -217,12 +221,16 @@ fn has_nuisance(recording: &Recording) -> bool {
 }
 
 impl InfluenceLocator {
-    /// Excludes channel `channel` (from 0); returns false, without a change, where that is impossible.
-    pub fn leave_out(&mut self, channel: usize) -> bool {
+    /// Disables channel `channel` (from 0); returns false, without a change, when no channel would remain.
+    ///
+    /// # Errors
+    /// [`NotPositiveDefinite`] for a singular noise covariance in a locator file.
+    pub fn leave_out(&mut self, channel: usize) -> Result<bool, NotPositiveDefinite> {
         match self {
-            Self::Beam(beam) => beam.leave_out(channel),
-            Self::Plane(plane) => plane.leave_out(channel),
-            Self::ForceLinear(_) | Self::Measured(_) => false,
+            Self::Beam(beam) => Ok(beam.leave_out(channel)),
+            Self::Plane(plane) => Ok(plane.leave_out(channel)),
+            Self::ForceLinear(linear) => Ok(linear.leave_out(channel)),
+            Self::Measured(measured) => measured.leave_out(channel),
         }
     }
 }

@@ -24,14 +24,15 @@ mod patches;
 mod profile_likelihood;
 mod smoothness;
 
+pub use crate::influence::LoadChannel;
 pub use cells::Cells;
 pub use patches::{CentreOfPressure, PATCH_SHARE, Patch};
 
 use ndarray::{Array1, Array2, Axis};
 use serde::Serialize;
-use std::sync::Arc;
 
 use crate::fit::{LARGEST, ReadingError};
+use crate::influence::NotProportional;
 use crate::setup::Setup;
 use crate::status::chi_squared_bound;
 use bounds::Bounds;
@@ -40,23 +41,12 @@ use even_loads::LoadQuantity;
 use palpate_core::Status;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, NoiseError, Sensor};
-use palpate_mechanics::surface::{Extent, InfluenceFunction, Surface, UniformLoad, Unsolvable};
+use palpate_mechanics::surface::{Extent, Surface, UniformLoad, Unsolvable};
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{Cholesky, extend_to, hull, median, normal_interval_95};
 use patch_number::{PatchLoads, Tables};
 use patches::{centre_of, contains, find_patches, mean_position, nearest};
 use smoothness::{Mixture, Problem};
-
-/// Channel.
-#[derive(Clone)]
-pub struct LoadChannel<'a> {
-    /// Reading per newton.
-    pub influence: Arc<dyn InfluenceFunction + 'a>,
-    /// Reading without load.
-    pub offset: f64,
-    /// Noise standard deviation, greater than 0.
-    pub noise_sd: f64,
-}
 
 /// Channels of a bench.
 #[derive(Clone)]
@@ -72,9 +62,12 @@ pub struct LoadSensors<'a> {
 pub enum LoadSensorsError {
     /// No model or fitted influence functions.
     #[error(
-        "a measured surface has no influence functions of a spread load; give a surface with a model, such as a beam"
+        "a spread load needs the influence functions of a surface with a model, or of a locator of kind `influence`"
     )]
     NoModel,
+    /// Readings of several loads that do not add up.
+    #[error(transparent)]
+    NotProportional(#[from] NotProportional),
     /// No noise, or only disabled sensors.
     #[error(transparent)]
     Noise(#[from] NoiseError),

@@ -243,7 +243,7 @@ pub(super) const fn contacts(numbers: usize) -> usize {
 }
 
 /// u, then position and force of each contact.
-pub(super) fn observed_on_line<const K: usize>(length_m: f64, greatest_n: f64) -> ObservedEntries<K> {
+pub(super) fn observed_on_line<const K: usize>(range_m: (f64, f64), greatest_n: f64) -> ObservedEntries<K> {
     ObservedEntries {
         entries: std::array::from_fn(|k| match k {
             0 => U,
@@ -252,7 +252,7 @@ pub(super) fn observed_on_line<const K: usize>(length_m: f64, greatest_n: f64) -
         }),
         bounds: std::array::from_fn(|k| match k {
             0 => (f64::NEG_INFINITY, f64::INFINITY),
-            k if k % 2 == 1 => (0.0, length_m),
+            k if k % 2 == 1 => range_m,
             _ => (0.0, greatest_n),
         }),
         is_place: std::array::from_fn(|k| k % 2 == 1),
@@ -452,11 +452,10 @@ pub(super) const ALONG: usize = 0;
 pub(super) const ACROSS: usize = 3;
 pub(super) const FORCE: usize = 6;
 
-pub(super) fn observed_on_plane(extent: Extent, greatest_n: f64) -> ObservedEntries<3> {
-    let [length_m, width_m] = sides_m(extent);
+pub(super) fn observed_on_plane([along_m, across_m]: [(f64, f64); 2], greatest_n: f64) -> ObservedEntries<3> {
     ObservedEntries {
         entries: [ALONG, ACROSS, FORCE],
-        bounds: [(0.0, length_m), (0.0, width_m), (0.0, greatest_n)],
+        bounds: [along_m, across_m, (0.0, greatest_n)],
         is_place: [true, true, false],
     }
 }

@@ -165,11 +165,11 @@ impl Observation<'_> {
     }
 
     pub fn entries_on_line<const K: usize>(&self) -> ObservedEntries<K> {
-        observed_on_line(self.likelihood.extent().length_m(), self.greatest_force_n())
+        observed_on_line(self.likelihood.position_ranges_m()[0], self.greatest_force_n())
     }
 
     pub fn entries_on_plane(&self) -> ObservedEntries<3> {
-        observed_on_plane(self.likelihood.extent(), self.greatest_force_n())
+        observed_on_plane(self.likelihood.position_ranges_m(), self.greatest_force_n())
     }
 
     pub fn fit_one(&self, line: &dyn LineLikelihood, about: &[f64; 3]) -> ContactFit<3> {

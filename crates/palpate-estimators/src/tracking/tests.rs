@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 mod drift;
 mod on_plane;
+mod without_model;
 
 use super::slow::SlowState;
 use super::*;
@@ -15,7 +16,7 @@ use crate::fit::{Fit, FitTask};
 use crate::fixtures::{Example, along_the_beam, moving_beam, swinging_beam, two_moving_loads};
 use crate::influence::{BeamLikelihood, Influence};
 use crate::interval_check::IntervalCheck;
-use crate::likelihood::{ContactFit, Likelihood, LineLikelihood};
+use crate::likelihood::{ContactFit, Likelihood, LineLikelihood, LocatorChecks};
 use crate::recording::Row;
 use crate::simulate::{CleanSensors, clean_reading};
 use crate::track_errors::TrackErrors;
@@ -466,7 +467,7 @@ fn the_check_of_the_locators_intervals_widens_tracks() {
     .unwrap();
     let readings = readings(&rig, along_the_beam(), 2);
     let tracks = |check: Option<IntervalCheck>| {
-        let likelihood = likelihood(&rig, None).with_interval_check(check);
+        let likelihood = likelihood(&rig, None).with_checks(LocatorChecks::default().with_intervals(check));
         let mut tracker = SmoothTracker::new(Arc::new(likelihood), TrackerConfig::default());
         for (time_s, _, reading) in readings.iter().take(150) {
             tracker.update(*time_s, reading).unwrap();

@@ -11,11 +11,9 @@ use super::multi_contact::{contact_fit, first_mode};
 use super::table::InfluenceTable;
 use crate::fit::Locate;
 use crate::force_prior::ForceRange;
-use crate::interval_check::IntervalCheck;
 use crate::likelihood::{
-    CalibrationVariance, ContactFit, Geometry, Likelihood, LineLikelihood, Linearisation, UntouchedSurface,
+    CalibrationVariance, ContactFit, Geometry, Likelihood, LineLikelihood, Linearisation, LocatorChecks,
 };
-use crate::untouched_drift::UntouchedDrift;
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
@@ -28,8 +26,7 @@ pub struct BeamLikelihood {
     locator: BeamLocator,
     /// g of the channels in use.
     first_mode: Vec<f64>,
-    untouched: UntouchedSurface,
-    interval_check: Option<IntervalCheck>,
+    checks: LocatorChecks,
 }
 
 impl BeamLikelihood {
@@ -37,22 +34,13 @@ impl BeamLikelihood {
     pub fn new(locator: &BeamLocator) -> Self {
         let table = &locator.search().table;
         let first_mode = (0..table.sensors).map(|s| share_of_first_mode(table, s)).collect();
-        Self {
-            locator: locator.clone(),
-            first_mode,
-            untouched: UntouchedSurface::default(),
-            interval_check: None,
-        }
+        Self { locator: locator.clone(), first_mode, checks: LocatorChecks::default() }
     }
 
+    /// Replaces the checks of the locator.
     #[must_use]
-    pub(crate) fn with_untouched(self, untouched: UntouchedSurface) -> Self {
-        Self { untouched, ..self }
-    }
-
-    #[must_use]
-    pub(crate) fn with_interval_check(self, interval_check: Option<IntervalCheck>) -> Self {
-        Self { interval_check, ..self }
+    pub fn with_checks(self, checks: LocatorChecks) -> Self {
+        Self { checks, ..self }
     }
 
     fn table(&self) -> &InfluenceTable {
@@ -181,16 +169,8 @@ impl Likelihood for BeamLikelihood {
         self.locator.locate(reading)
     }
 
-    fn is_residue(&self, reading: &[f64]) -> bool {
-        self.untouched.contains(reading)
-    }
-
-    fn interval_check(&self) -> Option<&IntervalCheck> {
-        self.interval_check.as_ref()
-    }
-
-    fn untouched_drift(&self) -> Option<&UntouchedDrift> {
-        self.untouched.drift.as_ref()
+    fn checks(&self) -> Option<&LocatorChecks> {
+        Some(&self.checks)
     }
 
     fn extent(&self) -> Extent {

@@ -8,17 +8,20 @@ use super::gauss_newton::Minimum;
 use super::multi_contact::locate_several;
 use super::posterior::{Read, conclude};
 use super::search::{ForEight, NEGLIGIBLE, Scratch, Search};
-use super::table::{FittedInfluence, InfluenceTable};
+use super::table::InfluenceTable;
 use crate::fit::{Locate, LocatorFault, NoCheck};
 use crate::influence::at_nodes::InfluencesAtNodes;
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
+use crate::influence::loads::LoadChannel;
 use crate::setup::Setup;
 use crate::status::{FalseAlarmRate, NO_CONTACT};
 use palpate_core::{Estimate, Status};
 use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::InfluenceFunction;
 use palpate_numerics::simd::{Array, EightLanes, InstructionSet, Kernel, Simd};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Locator that inverts the influence functions of a line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -92,9 +95,10 @@ impl BeamLocator {
 
     /// Returns influence function, offset and noise of each channel, in its SI unit; `None` for disabled
     /// channels.
-    pub fn influences(&self) -> impl Iterator<Item = Option<(FittedInfluence<'_>, f64, f64)>> {
-        let Stored { table, channels: Channels { offsets, noise_sd, dead, .. }, .. } = &self.stored;
-        (0..table.sensors).map(move |i| (!dead[i]).then(|| (table.function(i), offsets[i], noise_sd[i])))
+    pub fn influences(&self) -> Vec<Option<LoadChannel<'_>>> {
+        let Stored { table, channels, .. } = &self.stored;
+        let function = |channel: usize| Arc::new(table.function(channel)) as Arc<dyn InfluenceFunction + '_>;
+        channels.influences(channels.live().into_iter().map(function))
     }
 
     /// Returns the influence functions with their uncertainty at the nodes.

@@ -5,7 +5,7 @@ mod reference;
 use super::*;
 use crate::fit::Locate;
 use crate::fixtures::{faulty_paper, paper};
-use crate::influence::InfluenceSource;
+use crate::influence::{InfluenceSource, LoadChannel};
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::simulate::{clean_reading, displaced};
@@ -13,7 +13,7 @@ use ndarray::Array2;
 use palpate_core::{ContactEstimate, Status};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, measure};
-use palpate_mechanics::surface::{InfluenceFunction, Surface};
+use palpate_mechanics::surface::Surface;
 use palpate_numerics::Cholesky;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -288,10 +288,10 @@ fn influences_at_the_nodes_leave_out_dead_channels() {
     let locator = fit(Influence::default(), &bench.setup, &bench.simulate(1));
     let learnt = locator.influences_at_nodes();
     assert_eq!(learnt.channels, [0, 1, 3, 4, 5, 6, 7]);
-    let of_channels: Vec<_> = locator.influences().flatten().collect();
+    let of_channels: Vec<_> = locator.influences().into_iter().flatten().collect();
     for (i, position) in learnt.positions.iter().enumerate() {
-        for (k, (function, offset, noise_sd)) in of_channels.iter().enumerate() {
-            let (value, same) = (learnt.values[7 * i + k], function.at(*position));
+        for (k, LoadChannel { influence, offset, noise_sd }) in of_channels.iter().enumerate() {
+            let (value, same) = (learnt.values[7 * i + k], influence.at(*position));
             assert!((value - same).abs() < 1e-15, "{i}, {k}: {value} and {same}");
             assert_eq!((learnt.offsets[k], learnt.noise_sd[k]), (*offset, *noise_sd));
         }

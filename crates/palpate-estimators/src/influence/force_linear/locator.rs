@@ -63,6 +63,18 @@ impl Tables {
         }
     }
 
+    /// Removes a channel, counted from 0 among those in use.
+    pub fn without_channel(mut self, removed: usize) -> Self {
+        let channels = self.offsets.len().max(1);
+        let Self { offsets, noise_sd, offset_variances, values, variances, covariances } = &mut self;
+        // Every list has the channels of one place after those of another.
+        for list in [offsets, noise_sd, offset_variances, values, variances, covariances] {
+            let mut index = 0..;
+            list.retain(|_| index.next().is_some_and(|i: usize| i % channels != removed));
+        }
+        self
+    }
+
     /// Returns whether the posterior variance of a contact's reading exceeds two channels' noise at half of
     /// the nodes.
     pub fn are_open(&self, force_n: f64) -> bool {
@@ -504,12 +516,8 @@ impl ForceLinearLocator {
     }
 
     fn influences_at(&self, position: Position) -> Vec<f64> {
-        let node =
-            |axis: Axis, at_m: f64| ((at_m - axis.start) / axis.step).clamp(0.0, (axis.count - 1) as f64);
-        let [x, y] = self.axes();
         let mut values = Vec::new();
-        let at = [node(x, position.x_m), node(y, position.y_m)];
-        self.layers.interpolate(at, VALUES..VALUES + 1, &mut values);
+        self.layers.interpolate(self.nodes_at(position), VALUES..VALUES + 1, &mut values);
         values.as_flattened()[..self.stored.live.len()].to_vec()
     }
 

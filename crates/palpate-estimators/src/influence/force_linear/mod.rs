@@ -8,9 +8,12 @@ mod drift;
 mod drift_fit;
 mod evidence;
 mod force_prior;
+mod influence_function;
 mod learning;
 mod left_out;
+mod likelihood;
 mod locator;
+mod missing_channel;
 mod outliers;
 mod place_noise;
 mod place_noise_search;
@@ -25,6 +28,7 @@ mod shared_errors;
 
 pub use drift::DriftCourse;
 pub(crate) use learning::{FOLDS, MOST_PRESSES, MOST_SEARCHED};
+pub use likelihood::ForceLinearLikelihood;
 pub use locator::{ForceLinearLocator, Scatter};
 pub use prior::Source;
 

@@ -79,6 +79,7 @@ impl Fit for MeasuredInfluence {
             nuisance: presses.nuisance,
             residual_limit: f64::INFINITY,
             force_n: setup.force_n(),
+            missing: Vec::new(),
         }
         .into_locator();
         let limit = residual_limit(&locator, recording);
@@ -250,9 +251,7 @@ impl Presses {
 }
 
 fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
-    let table = locator.table();
-    let fitted = [table.x, table.y, table.nuisance].iter().filter(|axis| axis.count > 1).count();
-    let freedom = locator.whitening().channels().saturating_sub(fitted).max(1);
+    let freedom = locator.table().freedom(locator.whitening().channels());
     let [limit] =
         recording_bounds([chi_squared_bound(freedom)], recording, |reading| [locator.misfit(reading)]);
     limit

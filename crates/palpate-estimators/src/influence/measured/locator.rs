@@ -41,13 +41,16 @@ pub(super) struct Stored {
     /// Squared residual, in variances, from which a reading is `outside_model`.
     pub residual_limit: f64,
     pub force_n: Option<f64>,
+    /// Disabled channels, from 0; the whitening is of the others.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub missing: Vec<usize>,
 }
 
 /// Locator by learnt readings.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct MeasuredLocator {
-    stored: Stored,
+    pub(super) stored: Stored,
     search: Search,
 }
 
@@ -180,7 +183,8 @@ impl MeasuredLocator {
     /// Whitened reading; `None` off its scale.
     fn seen(&self, reading: &[f64]) -> Option<Seen<'_>> {
         let Stored { readings, whitening, .. } = &self.stored;
-        let scaled = reading.iter().map(|value| readings.scaled(*value)).collect::<Option<Vec<f64>>>()?;
+        let in_use = self.stored.channels_in_use().map(|channel| readings.scaled(reading[channel]));
+        let scaled = in_use.collect::<Option<Vec<f64>>>()?;
         let mut whitened = vec![0.0; whitening.channels()];
         whitening.apply(&scaled, &mut whitened);
         Some(Seen {
@@ -212,7 +216,12 @@ impl Locate for MeasuredLocator {
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
-        LocatorFault::check_count("whitened channels", setup.layout().len(), self.stored.whitening.channels())
+        let Stored { whitening, missing, .. } = &self.stored;
+        LocatorFault::check_count(
+            "whitened channels",
+            setup.layout().len(),
+            whitening.channels() + missing.len(),
+        )
     }
 }
 
@@ -227,6 +236,7 @@ impl Stored {
             LocatorFault::check_numbers(what, list.iter().copied(), good, bound)
         };
         let channels = whitening.channels();
+        LocatorFault::check_count("channels in use", channels, self.channels_in_use().count())?;
         LocatorFault::check_count("whitening weights", channels * channels, whitening.matrix.len())?;
         check_axes(&[table.x, table.y, table.nuisance])?;
         let nodes = table.x.count.saturating_mul(table.y.count).saturating_mul(table.nuisance.count);

@@ -15,6 +15,7 @@ mod curve;
 mod fitting;
 mod line;
 mod locator;
+mod missing_channel;
 mod presses;
 mod scan;
 mod table;

@@ -32,6 +32,12 @@ impl Table {
         self.x.count * self.y.count
     }
 
+    /// Degrees of freedom of a contact's residual from `channels` channels.
+    pub(super) fn freedom(&self, channels: usize) -> usize {
+        let fitted = [self.x, self.y, self.nuisance].iter().filter(|axis| axis.count > 1).count();
+        channels.saturating_sub(fitted)
+    }
+
     pub(super) fn channels(&self) -> usize {
         self.means.len() / self.variances.len().max(1)
     }

@@ -85,6 +85,43 @@ fn an_unknown_force_is_found_with_the_position_and_intervals_cover() {
     assert!((0.7..1.4).contains(&scores) && (0.7..1.4).contains(&force_scores), "{scores} {force_scores}");
 }
 
+/// A third channel, of noise that follows the first one's, is read as a value off the logarithmic scale.
+#[test]
+fn a_disabled_channel_is_ignored_as_if_it_had_not_been_recorded() {
+    let third = |row: &Row, rng: &mut Xoshiro256PlusPlus| {
+        let [first, second] = [row.reading[0], row.reading[1]];
+        (first * second).sqrt() * (1.0 + 0.01 * noise(rng))
+    };
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
+    let two = squeezes(1);
+    let rows = two.rows.iter().map(|row| {
+        let value = third(row, &mut rng);
+        Row { reading: [&row.reading[..], &[value]].concat(), ..row.clone() }
+    });
+    let setup = raw_setup(*STRIP, 3, None);
+    let mut locator = fit(&setup, &raw_recording(rows.collect()));
+    assert_eq!(locator.leave_out(2), Ok(true));
+    assert_eq!(locator.leave_out(2), Ok(true));
+    assert_eq!(locator.check(&setup), Ok(()));
+    let never_recorded = fit(&raw_setup(*STRIP, 2, None), &two);
+    let mut shifts = Vec::new();
+    for _ in 0..100 {
+        let (x_m, force_n) = (rng.random_range(0.01..0.09), rng.random_range(1.2..4.3));
+        let reading = squeeze(x_m, force_n, &mut rng).reading;
+        let estimate = locator.locate(&[&reading[..], &[-1.0]].concat());
+        let expected = never_recorded.locate(&reading);
+        assert_eq!(estimate.status, Status::Located);
+        let [found, own] = [estimate, expected].map(|estimate| estimate.contact);
+        let sd_m = own.uncertainty.unwrap().covariance[0].sqrt();
+        shifts.push((found.position.x_m - own.position.x_m).abs() / sd_m);
+    }
+    let shift = shifts.iter().sum::<f64>() / shifts.len() as f64;
+    assert!(shift < 0.3, "{shift} standard deviations");
+    let read: MeasuredLocator = serde_json::from_str(&serde_json::to_string(&locator).unwrap()).unwrap();
+    assert_eq!(read, locator);
+    assert_eq!((locator.leave_out(0), locator.leave_out(1)), (Ok(true), Ok(false)));
+}
+
 /// Compares estimates with mean and standard deviation of a sum over the whole grid: 2 % of a standard
 /// deviation on average, and rarely a third.
 fn check_against_sum<'a>(

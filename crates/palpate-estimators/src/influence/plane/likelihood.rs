@@ -5,11 +5,9 @@ use super::search::Search;
 use crate::fit::Locate;
 use crate::force_prior::ForceRange;
 use crate::influence::config::ForceBelief;
-use crate::interval_check::IntervalCheck;
 use crate::likelihood::{
-    CalibrationVariance, ContactFit, Geometry, Likelihood, Linearisation, PlaneLikelihood, UntouchedSurface,
+    CalibrationVariance, ContactFit, Geometry, Likelihood, Linearisation, LocatorChecks, PlaneLikelihood,
 };
-use crate::untouched_drift::UntouchedDrift;
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
@@ -21,8 +19,7 @@ pub struct PlateLikelihood {
     locator: PlaneLocator,
     /// Search without the normal prior of the force, which tracking applies once.
     search: Search,
-    untouched: UntouchedSurface,
-    interval_check: Option<IntervalCheck>,
+    checks: LocatorChecks,
 }
 
 impl PlateLikelihood {
@@ -32,19 +29,14 @@ impl PlateLikelihood {
         Self {
             locator: locator.clone(),
             search: locator.search_with(force),
-            untouched: UntouchedSurface::default(),
-            interval_check: None,
+            checks: LocatorChecks::default(),
         }
     }
 
+    /// Replaces the checks of the locator.
     #[must_use]
-    pub(crate) fn with_untouched(self, untouched: UntouchedSurface) -> Self {
-        Self { untouched, ..self }
-    }
-
-    #[must_use]
-    pub(crate) fn with_interval_check(self, interval_check: Option<IntervalCheck>) -> Self {
-        Self { interval_check, ..self }
+    pub fn with_checks(self, checks: LocatorChecks) -> Self {
+        Self { checks, ..self }
     }
 }
 
@@ -114,16 +106,8 @@ impl Likelihood for PlateLikelihood {
         self.locator.locate(reading)
     }
 
-    fn is_residue(&self, reading: &[f64]) -> bool {
-        self.untouched.contains(reading)
-    }
-
-    fn interval_check(&self) -> Option<&IntervalCheck> {
-        self.interval_check.as_ref()
-    }
-
-    fn untouched_drift(&self) -> Option<&UntouchedDrift> {
-        self.untouched.drift.as_ref()
+    fn checks(&self) -> Option<&LocatorChecks> {
+        Some(&self.checks)
     }
 
     fn extent(&self) -> Extent {

@@ -7,10 +7,13 @@ use crate::fit::{Locate, LocatorFault, NoCheck};
 use crate::influence::at_nodes::InfluencesAtNodes;
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
+use crate::influence::loads::LoadChannel;
 use crate::setup::Setup;
 use crate::status::FalseAlarmRate;
 use palpate_core::Estimate;
+use palpate_mechanics::surface::InfluenceFunction;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Locator that inverts the influence functions of a plane.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,6 +51,17 @@ impl PlaneLocator {
         let Stored { table, channels, .. } = &self.stored;
         let positions = (0..table.nodes()).map(|node| table.node(node)).collect();
         InfluencesAtNodes::of_table(positions, channels, [&table.values, &table.variances])
+    }
+
+    /// Returns influence function, offset and noise of each channel, in its SI unit; `None` for disabled
+    /// channels.
+    pub fn influences(&self) -> Vec<Option<LoadChannel<'_>>> {
+        let Self { stored: Stored { channels, .. }, search } = self;
+        let function = |(k, channel): (usize, &usize)| {
+            let function = search.patches.function(k, channels.noise_sd[*channel]);
+            Arc::new(function) as Arc<dyn InfluenceFunction + '_>
+        };
+        channels.influences(search.live.iter().enumerate().map(function))
     }
 
     pub(in crate::influence) fn channels(&self) -> &Channels {

@@ -3,9 +3,9 @@
 //! Derivatives at the nodes are fourth-order differences (Abramowitz and Stegun, table 25.2, five points;
 //! one-sided at the edges).
 
-use crate::influence::lanes::Lanes;
+use crate::influence::lanes::{LANES, Lanes};
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::Extent;
+use palpate_mechanics::surface::{Extent, InfluenceFunction};
 use serde::{Deserialize, Serialize};
 
 /// Influence functions of all sensors at the nodes of a grid over a rectangle.
@@ -186,6 +186,33 @@ impl Patches {
             near(y_m * self.inverse_spacing[1], self.rows),
         );
         row * self.columns + column
+    }
+}
+
+/// Influence function of one channel of the patches.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FittedInfluence<'a> {
+    patches: &'a Patches,
+    channel: usize,
+    scale: f64,
+}
+
+impl Patches {
+    /// Influence function of a channel, counted from 0, times `scale`.
+    pub fn function(&self, channel: usize, scale: f64) -> FittedInfluence<'_> {
+        FittedInfluence { patches: self, channel, scale }
+    }
+}
+
+impl InfluenceFunction for FittedInfluence<'_> {
+    fn at(&self, Position { x_m, y_m }: Position) -> f64 {
+        let values = self.patches.value(&self.patches.place(x_m, y_m), self.channel / LANES);
+        self.scale * values[self.channel % LANES]
+    }
+
+    fn gradient(&self, Position { x_m, y_m }: Position) -> [f64; 2] {
+        let values = self.patches.values(&self.patches.place(x_m, y_m), self.channel / LANES);
+        [values.along, values.across].map(|lanes| self.scale * lanes[self.channel % LANES])
     }
 }
 

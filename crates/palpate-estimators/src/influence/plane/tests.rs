@@ -2,9 +2,10 @@
 
 use super::*;
 use crate::arrangement::cells;
-use crate::fit::{FitTask, Locate};
+use crate::fit::{Fit, FitTask, Locate};
 use crate::fixtures::{Example, plate};
 use crate::influence::{ForceBelief, Influence, InfluenceFitError, InfluenceSource};
+use crate::load_profile::{LoadChannel, LoadSensors};
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::simulate::CleanSensors;
@@ -14,6 +15,7 @@ use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, Sensor, measure};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::surface::plate::PlateSpec;
+use palpate_numerics::mean;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -320,6 +322,42 @@ fn faults_that_a_calibration_shows_are_corrected() {
     }
     eprintln!("gains, offsets and places off: {:.3} × limit", error_m / limit_m);
     assert!(error_m < 1.3 * limit_m, "{:.3} × limit", error_m / limit_m);
+}
+
+/// Gains and offsets that the mechanics do not know.
+#[test]
+fn spread_loads_have_learnt_influence_functions_with_their_gains() {
+    let rig = plate(24, ChannelModel { gain_error: 0.1, offset_error: 100e-6, ..NOISE });
+    let recording = rig.simulate(3);
+    let locator = Influence::default().fit(&rig.setup, &recording).unwrap().into_locator();
+    let sensors = locator.load_sensors().unwrap();
+    let mechanics = LoadSensors::from_setup(&rig.setup).unwrap();
+    let misfits = [sensors, mechanics].map(|sensors| {
+        let squares = recording.rows.iter().flat_map(|row| {
+            let channels = row.reading.iter().zip(sensors.channels.iter().flatten());
+            let misfit = |(value, channel): (&f64, &LoadChannel)| {
+                (value - channel.offset - 5.0 * channel.influence.at(row.position)) / channel.noise_sd
+            };
+            channels.map(misfit).map(|misfit| misfit * misfit).collect::<Vec<f64>>()
+        });
+        mean(squares).sqrt()
+    });
+    assert!((0.8..1.2).contains(&misfits[0]) && misfits[1] > 5.0, "{misfits:?}");
+}
+
+#[test]
+fn gradients_of_learnt_influence_functions_are_their_slopes() {
+    let rig = plate(24, NOISE);
+    let locator = fit(Influence::default(), &rig.setup, &rig.simulate(1));
+    let step_m = 1e-6;
+    for channel in locator.influences().into_iter().flatten() {
+        let at = |x_m: f64, y_m: f64| channel.influence.at(Position { x_m, y_m });
+        let gradient = channel.influence.gradient(Position { x_m: 0.0731, y_m: 0.2117 });
+        let along = (at(0.0731 + step_m, 0.2117) - at(0.0731 - step_m, 0.2117)) / (2.0 * step_m);
+        let across = (at(0.0731, 0.2117 + step_m) - at(0.0731, 0.2117 - step_m)) / (2.0 * step_m);
+        let size = along.abs().max(across.abs());
+        assert!((gradient[0] - along).abs() < 1e-5 * size && (gradient[1] - across).abs() < 1e-5 * size);
+    }
 }
 
 #[test]

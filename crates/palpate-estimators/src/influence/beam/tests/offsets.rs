@@ -105,7 +105,7 @@ fn noise_is_told_by_the_untouched_rows() {
     // The rig states a third of it.
     let setup = setup();
     let locator = Influence::default().fit_beam(FitTask::new(&setup, &recording)).unwrap();
-    for noise in locator.influences().flatten().map(|(.., noise)| noise) {
+    for noise in locator.influences().into_iter().flatten().map(|channel| channel.noise_sd) {
         assert!((2.6e-6..3.3e-6).contains(&noise), "{noise}");
     }
 }

@@ -6,7 +6,7 @@ use super::*;
 const SHARE: f64 = 0.15;
 
 /// A strip whose readings saturate by a share, and touches of it.
-fn saturating_strip(seed: u64, share: f64) -> (Bench, Vec<Row>) {
+pub(super) fn saturating_strip(seed: u64, share: f64) -> (Bench, Vec<Row>) {
     let mut bench = Bench::strip(seed, 75, 25);
     let mut touches = bench.touches(60);
     let offsets = bench.offsets.clone();
