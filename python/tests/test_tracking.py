@@ -169,7 +169,7 @@ def test_a_reading_that_is_refused_is_as_if_it_had_not_been(locator, presses):
         with pytest.raises(pp.PalpateError, match=words):
             one.follow(time, wrong)
     assert one.follow(1.0, reading) == other.follow(1.0, reading)
-    with pytest.raises(pp.PalpateError, match="an influence locator of a surface with a model"):
+    with pytest.raises(pp.PalpateError, match="a locator of kind `influence` tracks contacts"):
         pp.Neighbours().fit(presses).tracker()
     with pytest.raises(pp.PalpateError, match="`damping` does not go without a `frequency`"):
         locator.tracker(damping=0.1)
@@ -214,7 +214,7 @@ def test_what_cannot_be_followed_is_refused_in_words(beam, presses, locator, pla
         locator.track([0.0, np.nan, 0.2], readings)
     with pytest.raises(pp.PalpateError, match="`damping` is 1; it must be"):
         locator.track([0.0, 0.1, 0.2], readings, frequency=17, damping=1)
-    with pytest.raises(pp.PalpateError, match="an influence locator of a surface with a model"):
+    with pytest.raises(pp.PalpateError, match="a locator of kind `influence` tracks contacts"):
         pp.Neighbours().fit(presses).track([0.0, 0.1, 0.2], readings)
     with pytest.raises(TypeError, match="`readings` are needed"):
         locator.track([0.0, 0.1, 0.2])

@@ -346,7 +346,7 @@ fn a_session_that_cannot_be_had_is_refused_with_the_reason() {
     let centroid = palpate_estimators::estimator::Estimator::Centroid(palpate_estimators::centroid::Centroid);
     let centroid = centroid.fit_task(FitTask::new(&rig.setup, &recording)).unwrap();
     let kind = refused(&centroid, Estimation::Track { frequency_hz: None, creep: None });
-    assert!(kind.contains("influence locator"), "{kind}");
+    assert!(kind.contains("a locator of kind `influence`"), "{kind}");
 }
 
 /// A session and the monitor of its feed, in virtual time.

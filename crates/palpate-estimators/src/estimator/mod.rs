@@ -663,7 +663,7 @@ pub struct Tracking {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NotTrackable {
     /// Method without a likelihood.
-    #[error("a moving contact is tracked by a locator of kind `influence`; this one is of kind `{kind}`")]
+    #[error("a locator of kind `influence` tracks contacts; this one is of kind `{kind}`")]
     Kind {
         /// Kind of the locator.
         kind: &'static str,

@@ -18,7 +18,7 @@ pub struct EvaluatedContact {
     pub estimate: Position,
     /// Coordinates in their 95 % intervals; `None` without intervals.
     pub covered: Option<CoveredCoordinates>,
-    /// Interval score: see [`Evaluation::interval_score_m`].
+    /// Interval score: see [`Evaluation::interval_score_m`](super::Evaluation::interval_score_m).
     pub interval_score_m: Option<f64>,
     /// Status of the estimate, where kept.
     pub status: Option<Status>,
