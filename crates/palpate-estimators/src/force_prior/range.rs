@@ -21,7 +21,7 @@ pub struct ForceRange {
     greatest_n: f64,
 }
 
-/// Ratio of contact forces to press forces.
+/// Ratio of contact forces to press forces, a policy.
 pub(crate) const DECADE: f64 = 10.0;
 
 /// Ratio of press forces up to which they count as one, a policy: saturation resembles a varying hand.

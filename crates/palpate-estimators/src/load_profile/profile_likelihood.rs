@@ -16,8 +16,8 @@ pub(super) const NON_NEGATIVE_INCREASE: f64 = 5.0;
 /// Beyond these doublings of a step the value is unbounded.
 const MOST_DOUBLINGS: usize = 40;
 const MOST_HALVINGS: usize = 20;
-/// Distance from the critical misfit, for interpolation: 0.03 % of coverage.
-const TOLERANCE: f64 = 0.01;
+/// Distance from the critical misfit, for interpolation: 0.003 % of coverage.
+const TOLERANCE: f64 = 0.001;
 
 /// Load of least misfit for its value.
 #[derive(Clone)]
