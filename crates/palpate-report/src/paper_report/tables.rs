@@ -202,7 +202,9 @@ impl Paper<'_> {
             .numeric("found", |figure| quantile_range(figure.result, number_format(figure)))
             .short("agrees if within", |figure| criterion_text(figure))
             .column("short", "verdict", |figure| verdict(figure.agrees, "agrees", "differs"))
-            .column("short", "within 5–95 %", |figure| verdict(figure.within_seeds, "yes", "no"))
+            .column("short", "within 5–\u{2060}95\u{a0}%", |figure| {
+                verdict(figure.within_seeds, "yes", "no")
+            })
             .caption(caption)
     }
 
