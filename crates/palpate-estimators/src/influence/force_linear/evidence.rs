@@ -6,7 +6,10 @@
 //! |M·L⁻¹·y|²/ν and ν the presses minus the columns of H. A source at p of amplitude variance τ·s² adds the
 //! column u(p): |M·L⁻¹·y|² falls by τ·(vᵀ·w)²/(1 + τ·vᵀ·v), with v = M·L⁻¹·u and w = M·L⁻¹·y, and the
 //! determinants grow by ln(1 + τ·vᵀ·v). Positions and powers of ten of τ are averaged.
+//!
+//! Under a prior of the noise variance ([`NoiseDensity`]), the density of |M·L⁻¹·y|² replaces s^(−ν).
 
+use super::noise_prior::{NoiseDensity, ResidueMixture};
 use super::prior::Prior;
 use crate::influence::calibration::{CalibrationRows, Repeats};
 use ndarray::linalg::general_mat_mul;
@@ -18,6 +21,11 @@ type Decades = std::ops::RangeInclusive<i32>;
 pub(super) const ALL_DECADES: Decades = -10..=1;
 /// Powers of ten of τ.
 const AMPLITUDES: std::ops::RangeInclusive<i32> = 0..=6;
+
+/// Amplitude variances over the noise variance.
+pub(super) fn amplitudes_over_noise() -> impl Iterator<Item = f64> {
+    (1..=4).map(|k| 100f64.powi(k))
+}
 const LEAST_SHARE: f64 = 1e-3;
 
 /// Covariance with offset and polynomials projected out.
@@ -114,19 +122,21 @@ pub(super) struct Evidence<'a> {
     effects: Array2<f64>,
     sources: Array2<f64>,
     repeats: RepeatedNoise,
-    noise_priors: Vec<NoisePrior>,
+    noise_priors: Vec<FlatNoise>,
+    /// Noise variance of each channel; empty for the most probable noise.
+    densities: Vec<ResidueMixture>,
 }
 
-/// Prior of the noise for few presses, which coefficients may fit exactly: 1 % of the signal within a factor
+/// Prior of the most probable noise of few presses, which coefficients may fit exactly: 1 % of the signal within a factor
 /// of three, heavy-tailed (Student's t, one degree of freedom), above rounding.
-struct NoisePrior {
+struct FlatNoise {
     changes: f64,
     rounding: f64,
     /// [`CalibrationRows::fewness`].
     weight: f64,
 }
 
-impl NoisePrior {
+impl FlatNoise {
     fn of_channels(presses: &CalibrationRows) -> Vec<Self> {
         let channel = |c: usize| {
             let (_, changes) = mean_and_variance(presses.means.column(c).iter().copied());
@@ -214,16 +224,32 @@ impl<'a> Evidence<'a> {
             effects: prior.effects(presses),
             sources: prior.sources(presses, sensors_m),
             repeats: RepeatedNoise::new(presses, prior),
-            noise_priors: NoisePrior::of_channels(presses),
+            noise_priors: FlatNoise::of_channels(presses),
+            densities: Vec::new(),
         }
     }
 
-    fn freedom(&self) -> f64 {
+    /// The same evidence under priors of the channels' noise variances.
+    pub fn with_noise(self, noises: &[NoiseDensity]) -> Self {
+        let densities = noises.iter().map(|noise| ResidueMixture::new(noise, self.freedom())).collect();
+        Self { densities, ..self }
+    }
+
+    pub fn freedom(&self) -> f64 {
         self.presses.len() as f64 + self.repeats.freedom - self.effects.ncols() as f64
     }
 
     pub fn restricted(&self, ratio: f64) -> Result<Restricted, NotPositiveDefinite> {
         Restricted::new(self.noise.added_to(&self.covariance, ratio), &self.effects)
+    }
+
+    /// τ, the amplitude variances over s².
+    pub fn amplitudes(&self, ratio: f64) -> Vec<f64> {
+        if self.densities.is_empty() {
+            AMPLITUDES.map(|decade| 10f64.powi(decade)).collect()
+        } else {
+            amplitudes_over_noise().map(|tau| tau * ratio).collect()
+        }
     }
 
     /// Fits at the best power of ten of ρ; `None` where offset and polynomials are unidentifiable.
@@ -267,7 +293,8 @@ impl<'a> Evidence<'a> {
     fn with_ratio(&self, ratio: f64) -> Option<Vec<ChannelFit>> {
         let restricted = self.restricted(ratio).ok()?;
         let (white, _) = restricted.residuals(self.presses.means.clone());
-        let sources = WhiteSources::new(restricted.residuals(self.sources.clone()).0);
+        let sources =
+            WhiteSources::new(restricted.residuals(self.sources.clone()).0, &self.amplitudes(ratio));
         let products = sources.products(&white.view());
         let fits = (0..self.presses.centre.len())
             .map(|c| {
@@ -289,28 +316,53 @@ impl<'a> Evidence<'a> {
         white: &ArrayView1<f64>,
         (sources, products): (&WhiteSources, &ArrayView1<f64>),
     ) -> ChannelFit {
-        let freedom = self.freedom();
-        let square = white.dot(white) + self.repeats.squares[c] / ratio;
-        let determinant =
-            restricted.log_determinant + self.repeats.freedom * ratio.ln() + self.repeats.log_determinant;
-        if sources.is_empty() {
-            let signal = square / freedom;
-            let evidence = -0.5 * (freedom * signal.ln() + determinant);
-            return ChannelFit { ratio, signal, evidence, sources: Vec::new() };
-        }
-        let mut tried = Vec::with_capacity(sources.amplitudes.len());
-        for Amplitude { place, variance, log_determinant } in &sources.amplitudes {
-            let product = products[*place];
-            let signal = (square - variance * product * product).max(f64::MIN_POSITIVE) / freedom;
-            let evidence = -0.5 * (freedom * signal.ln() + determinant + log_determinant);
-            tried.push((
-                evidence,
-                signal,
-                SourceFit { place: *place, weight: 0.0, amplitude: variance * product, variance: *variance },
-            ));
-        }
-        average(ratio, &mut tried)
+        let fit = |Residue { square, log_determinant, source }: Residue| {
+            let (log_density, signal) = match self.densities.get(c) {
+                Some(density) => density.of_residue(square, ratio),
+                None => {
+                    let signal = square / self.freedom();
+                    (-0.5 * self.freedom() * signal.ln(), signal)
+                }
+            };
+            (log_density - 0.5 * log_determinant, signal, source)
+        };
+        let residues = self.residues(restricted, ratio, (c, white.dot(white)), (sources, products));
+        let tried: Vec<_> = residues.map(fit).collect();
+        if self.densities.is_empty() { average(ratio, &tried) } else { sampled(ratio, &tried) }
     }
+
+    /// Residues of channel `c`, with |M·L⁻¹·y|² = `square`, without a source or with each source and amplitude.
+    pub fn residues(
+        &self,
+        restricted: &Restricted,
+        ratio: f64,
+        (c, square): (usize, f64),
+        (sources, products): (&WhiteSources, &ArrayView1<f64>),
+    ) -> impl Iterator<Item = Residue> {
+        let square = square + self.repeats.squares[c] / ratio;
+        let log_determinant =
+            restricted.log_determinant + self.repeats.freedom * ratio.ln() + self.repeats.log_determinant;
+        let without = sources.is_empty().then_some(Residue { square, log_determinant, source: None });
+        let with = sources.amplitudes.iter().map(move |amplitude| {
+            let Amplitude { place, variance, log_determinant: of_source } = *amplitude;
+            let product = products[place];
+            Residue {
+                square: (square - variance * product * product).max(f64::MIN_POSITIVE),
+                log_determinant: log_determinant + of_source,
+                source: Some(SourceFit { place, weight: 0.0, amplitude: variance * product, variance }),
+            }
+        });
+        without.into_iter().chain(with)
+    }
+}
+
+/// Presses minus the best coefficients of offset, polynomials and a source.
+pub(super) struct Residue {
+    /// |M·L⁻¹·y|² over s².
+    pub square: f64,
+    /// ln of all determinants.
+    pub log_determinant: f64,
+    source: Option<SourceFit>,
 }
 
 #[derive(Clone)]
@@ -330,12 +382,11 @@ struct Amplitude {
 }
 
 impl WhiteSources {
-    pub fn new(columns: Array2<f64>) -> Self {
+    pub fn new(columns: Array2<f64>, taus: &[f64]) -> Self {
         let mut squares = vec![0.0; columns.ncols()];
         for row in columns.outer_iter() {
             squares.iter_mut().zip(row).for_each(|(square, v)| *square += v * v);
         }
-        let taus: Vec<f64> = AMPLITUDES.map(|decade| 10f64.powi(decade)).collect();
         let amplitudes = squares.iter().enumerate().flat_map(|(place, length)| {
             taus.iter().map(move |tau| Amplitude {
                 place,
@@ -357,17 +408,43 @@ impl WhiteSources {
     }
 }
 
-fn average(ratio: f64, tried: &mut [(f64, f64, SourceFit)]) -> ChannelFit {
+fn average(ratio: f64, tried: &[(f64, f64, Option<SourceFit>)]) -> ChannelFit {
     let best = tried.iter().fold(f64::NEG_INFINITY, |best, (evidence, ..)| best.max(*evidence));
-    tried.iter_mut().for_each(|(evidence, _, source)| source.weight = (*evidence - best).exp());
     let count = tried.len() as f64;
-    let all: f64 = tried.iter().map(|(.., source)| source.weight).sum();
-    let kept = || tried.iter().filter(|(.., source)| source.weight >= LEAST_SHARE);
-    let total: f64 = kept().map(|(.., source)| source.weight).sum();
+    let weight = |evidence: f64| (evidence - best).exp();
+    let all: f64 = tried.iter().map(|(evidence, ..)| weight(*evidence)).sum();
+    let kept = || tried.iter().filter(|(evidence, ..)| weight(*evidence) >= LEAST_SHARE);
+    let total: f64 = kept().map(|(evidence, ..)| weight(*evidence)).sum();
+    let with_weight = |(evidence, _, source): &(f64, f64, Option<SourceFit>)| {
+        source.map(|source| SourceFit { weight: weight(*evidence) / total, ..source })
+    };
     ChannelFit {
         ratio,
-        signal: kept().map(|(_, signal, source)| source.weight * signal).sum::<f64>() / total,
+        signal: kept().map(|(evidence, signal, _)| weight(*evidence) * signal).sum::<f64>() / total,
         evidence: best + (all / count).ln(),
-        sources: kept().map(|(.., source)| SourceFit { weight: source.weight / total, ..*source }).collect(),
+        sources: kept().filter_map(with_weight).collect(),
     }
+}
+
+/// The average over a systematic sample of the sources.
+fn sampled(ratio: f64, tried: &[(f64, f64, Option<SourceFit>)]) -> ChannelFit {
+    const SAMPLE: usize = 100;
+    let best = tried.iter().fold(f64::NEG_INFINITY, |best, (evidence, ..)| best.max(*evidence));
+    let weight = |evidence: f64| (evidence - best).exp();
+    let all: f64 = tried.iter().map(|(evidence, ..)| weight(*evidence)).sum();
+    let signal = tried.iter().map(|(evidence, signal, _)| weight(*evidence) / all * signal).sum();
+    let (mut passed, mut drawn) = (0.0, 0);
+    let mut sources = Vec::new();
+    for (evidence, _, source) in tried {
+        passed += weight(*evidence) / all;
+        let before = drawn;
+        while drawn < SAMPLE && (drawn as f64 + 0.5) / (SAMPLE as f64) < passed {
+            drawn += 1;
+        }
+        if drawn > before {
+            let weight = (drawn - before) as f64 / SAMPLE as f64;
+            sources.extend(source.map(|source| SourceFit { weight, ..source }));
+        }
+    }
+    ChannelFit { ratio, signal, evidence: best + (all / tried.len() as f64).ln(), sources }
 }

@@ -3,13 +3,16 @@
 //! Smooth functions and point sensors at unknown positions ([`Prior::source`]) compete at held-out positions,
 //! with hyperparameters of largest log evidence.
 
+use super::averaging::{Average, HeldOut};
+use super::component_search::ComponentSearch;
 use super::drift::{DriftCourse, END, START};
 use super::drift_fit::DriftFit;
 use super::evidence::{ALL_DECADES, ChannelFit, Evidence};
+use super::noise_prior::NoisePrior;
 use super::outliers::OutlierTest;
 use super::place_noise::PlaceNoise;
 use super::place_noise_search::PlaceNoiseSearch;
-use super::posterior::{Functions, functions, of_equal_ratio, offsets, readings};
+use super::posterior::{Conditions, Functions, of_equal_ratio, offsets, readings};
 use super::prior::{Prior, Source};
 use super::shared_errors::loadings;
 use crate::fit::FitTask;
@@ -43,6 +46,11 @@ pub(super) struct Learnt {
     pub live: Vec<usize>,
     fits: Vec<ChannelFit>,
     sensors_m: Vec<Vec<f64>>,
+    /// Of the most probable smooth functions.
+    lengths_m: Vec<f64>,
+    average: Average,
+    /// Candidate positions of sources.
+    everywhere_m: Vec<Vec<f64>>,
     /// Variance factor of the process.
     widening: f64,
     pub set_aside: Vec<usize>,
@@ -78,13 +86,26 @@ impl Learnt {
         let learn = |noise: Option<&PlaceNoise>| {
             Self::without_outliers(setup, recording, structure, most_presses, noise, watch)
         };
-        let Some(learnt) = learn(None)? else { return Ok(None) };
+        let Some(mut learnt) = learn(None)? else { return Ok(None) };
         // Outliers resemble local noise and vice versa: noise is estimated without outliers, and outliers
         // with this noise.
-        match learnt.noise_by_place(watch)? {
-            None => Ok(Some(learnt)),
-            Some(noise) => learn(Some(&noise)),
+        if let Some(noise) = learnt.noise_by_place(watch)? {
+            let Some(with_noise) = learn(Some(&noise))? else { return Ok(None) };
+            learnt = with_noise;
         }
+        learnt.average(watch)?;
+        Ok(Some(learnt))
+    }
+
+    /// Averages the components of the structure.
+    fn average(&mut self, watch: Watch) -> Result<(), MeasuredError> {
+        let searched = self.pressed.thinned(MOST_SEARCHED);
+        let noises = NoisePrior::candidates(&searched);
+        let search =
+            ComponentSearch { presses: &searched, noises: &noises, sensors_m: &self.everywhere_m, watch };
+        self.average = Average::new(&search.found(&self.prior, &self.lengths_m)?, &noises);
+        self.widening = self.held_out_widening(watch)?;
+        Ok(())
     }
 
     fn without_outliers(
@@ -168,16 +189,26 @@ impl Learnt {
                 Err(error) => return Err(error),
             }
         }
+        let lengths_m = judged[0].found.prior.lengths_m.clone();
         let best = judged.into_iter().max_by(|a, b| a.score.total_cmp(&b.score));
-        let Some(Judged { found: Found { prior, fits, sensors_m }, widening, .. }) = best else {
+        let Some(Judged { found: Found { prior, fits, sensors_m }, .. }) = best else {
             return Ok(None);
         };
         let set_aside = set_aside.to_vec();
-        Ok(Some(Self { pressed, presses, drift, prior, live, fits, sensors_m, widening, set_aside }))
-    }
-
-    pub fn noise_sd(&self) -> Vec<f64> {
-        self.fits.iter().map(|fit| fit.noise_variance().sqrt()).collect()
+        Ok(Some(Self {
+            pressed,
+            presses,
+            drift,
+            prior,
+            live,
+            fits,
+            sensors_m,
+            lengths_m,
+            average: Average::default(),
+            everywhere_m: everywhere(extent),
+            widening: 1.0,
+            set_aside,
+        }))
     }
 
     pub fn shared_errors(&self) -> Result<Vec<f64>, MeasuredError> {
@@ -186,11 +217,9 @@ impl Learnt {
 
     /// Offsets, and influences per newton of φ.
     pub fn functions(&self, places_m: &[Vec<f64>], watch: Watch) -> Result<Vec<Functions>, MeasuredError> {
-        let mut functions =
-            all_functions(&self.prior, &self.presses, &self.fits, &self.sensors_m, places_m, watch)?;
+        let mut functions = self.average.functions(&self.presses, &self.everywhere_m, places_m, watch)?;
         let per_newton = 1.0 / self.prior.force_scale_n;
-        let widening = self.widening.max(few_positions(&self.prior, &self.presses))
-            * dependence(&self.prior, &self.presses);
+        let widening = self.widening * dependence(&self.prior, &self.presses);
         if let Some(drift) = &self.drift {
             for (functions, variance) in functions.iter_mut().zip(drift.variances_at_the_end()?) {
                 functions.offset_variance += variance;
@@ -279,18 +308,6 @@ impl Learnt {
     }
 }
 
-/// Variance factor for a scale from few positions: that of Student's t over the normal density.
-fn few_positions(prior: &Prior, presses: &CalibrationRows) -> f64 {
-    /// Student's t has a variance above 2 degrees of freedom.
-    const LEAST: usize = 3;
-    /// Degree of freedom of the length scale.
-    const LENGTH: usize = 1;
-    let of_presses = presses.len().saturating_sub(1 + prior.polynomials() + LENGTH);
-    let of_positions = presses.positions_m().len().saturating_sub(prior.polynomials() + LENGTH);
-    let freedom = of_presses.min(of_positions).max(LEAST) as f64;
-    1.0 + presses.fewness() * (freedom / (freedom - 2.0) - 1.0)
-}
-
 /// Variance factor for correlated errors of the channels.
 ///
 /// Wrong positions or forces make all channels scatter with force; half of this is assumed to shift the
@@ -299,24 +316,6 @@ fn dependence(prior: &Prior, presses: &CalibrationRows) -> f64 {
     const MOVES_POSITION: f64 = 0.5;
     let scattered = mean(presses.force_n.iter().map(|force_n| 1.0 - 1.0 / prior.scatter_of(*force_n)));
     1.0 + scattered * (MOVES_POSITION * presses.centre.len() as f64 - 1.0).max(0.0)
-}
-
-fn all_functions(
-    prior: &Prior,
-    presses: &CalibrationRows,
-    fits: &[ChannelFit],
-    sensors_m: &[Vec<f64>],
-    places_m: &[Vec<f64>],
-    watch: Watch,
-) -> Result<Vec<Functions>, MeasuredError> {
-    let mut all: Vec<(usize, Functions)> = Vec::with_capacity(fits.len());
-    for channels in of_equal_ratio(fits) {
-        let asked: Vec<_> = channels.iter().map(|c| (*c, &fits[*c])).collect();
-        let found = functions(prior, presses, &asked, sensors_m, places_m, watch)?;
-        all.extend(channels.into_iter().zip(found));
-    }
-    all.sort_by_key(|(c, _)| *c);
-    Ok(all.into_iter().map(|(_, functions)| functions).collect())
 }
 
 struct Found {
@@ -328,26 +327,13 @@ struct Found {
 struct Judged {
     found: Found,
     score: f64,
-    widening: f64,
 }
 
 impl Judged {
     fn new(found: Found, presses: &CalibrationRows, watch: Watch) -> Result<Self, MeasuredError> {
-        const MOST: f64 = 25.0;
-        let positions_m = presses.positions_m();
-        if positions_m.len() < LEAST_TO_JUDGE {
-            return Ok(Self { found, score: 0.0, widening: 1.0 });
-        }
-        let fold_of = |i: usize| {
-            let place = positions_m.partition_point(|other| compare(other, &presses.positions_m[i]).is_lt());
-            (presses.force_n[i] != 0.0).then_some(place % FOLDS)
-        };
-        // Squared errors with the variances of noise and process.
         let mut errors: Vec<[f64; 3]> = Vec::new();
-        for fold in 0..FOLDS {
+        for (held, kept) in folds(presses) {
             watch.round()?;
-            let (held, kept): (Vec<usize>, Vec<usize>) =
-                (0..presses.len()).partition(|i| fold_of(*i) == Some(fold));
             found.add_errors(presses, &held, &presses.select(&kept), &mut errors, watch)?;
         }
         let score = |[square, noise, process]: &[f64; 3]| {
@@ -355,13 +341,62 @@ impl Judged {
             -0.5 * (variance.ln() + square / variance)
         };
         let score = errors.iter().map(score).sum();
+        Ok(Self { found, score })
+    }
+}
+
+/// Presses held out and the others, by [`FOLDS`] positions; empty with few positions.
+fn folds(presses: &CalibrationRows) -> Vec<(Vec<usize>, Vec<usize>)> {
+    let positions_m = presses.positions_m();
+    if positions_m.len() < LEAST_TO_JUDGE {
+        return Vec::new();
+    }
+    let fold_of = |i: usize| {
+        let place = positions_m.partition_point(|other| compare(other, &presses.positions_m[i]).is_lt());
+        (presses.force_n[i] != 0.0).then_some(place % FOLDS)
+    };
+    (0..FOLDS).map(|fold| (0..presses.len()).partition(|i| fold_of(*i) == Some(fold))).collect()
+}
+
+impl Learnt {
+    /// Variance factor that makes errors at held-out positions as large as predicted.
+    fn held_out_widening(&self, watch: Watch) -> Result<f64, MeasuredError> {
+        const MOST: f64 = 25.0;
+        /// With fewer positions, the hyperparameters' uncertainty determines the errors.
+        const LEAST_POSITIONS: usize = 19;
+        let presses = &self.presses;
+        if presses.positions_m().len() < LEAST_POSITIONS {
+            return Ok(1.0);
+        }
+        // Squared errors with the variances of noise and process.
+        let mut errors: Vec<[f64; 3]> = Vec::new();
+        for (held, kept) in folds(presses) {
+            let (others, kept) = (presses.select(&held), presses.select(&kept));
+            let found = match self.average.held_out(&kept, &self.everywhere_m, &others, watch) {
+                Ok(found) => found,
+                // Without the held-out positions the polynomials are unidentifiable.
+                Err(MeasuredError::Noise(_)) => continue,
+                Err(error) => return Err(error),
+            };
+            for (c, HeldOut { readings, noise_variance }) in found.into_iter().enumerate() {
+                for (k, (reading, process)) in readings.into_iter().enumerate() {
+                    let error = others.means[[k, c]] + others.centre[c] - reading;
+                    let noise = noise_variance * self.prior.relative_noise_of(&others, k);
+                    errors.push([error * error, noise / others.count[k], process]);
+                }
+            }
+        }
         let too_small = |widening: f64| {
             let standardized =
                 errors.iter().map(|[square, noise, process]| square / (noise + widening * process));
             standardized.sum::<f64>() > errors.len() as f64
         };
-        let widening = bisect((1.0, MOST), 30, too_small);
-        Ok(Self { found, score, widening })
+        Ok(if errors.is_empty() { 1.0 } else { bisect((1.0, MOST), 30, too_small) })
+    }
+
+    /// Length scale of the finest influence functions along an axis; 0 with point sensors, which have none.
+    pub fn finest_m(&self, k: usize) -> f64 {
+        if self.average.has_source() { 0.0 } else { self.average.shortest_m(k) }
     }
 }
 
@@ -378,12 +413,12 @@ impl Found {
         let others = presses.select(held);
         for channels in of_equal_ratio(&self.fits) {
             watch.round()?;
-            let asked: Vec<_> = channels.iter().map(|c| (*c, &self.fits[*c])).collect();
-            let found = readings(&self.prior, kept, &asked, &self.sensors_m, &others)?;
-            for ((c, fit), readings) in asked.into_iter().zip(found) {
+            let conditions = Conditions::of_fits(&self.prior, &self.fits, &channels);
+            let found = readings(&conditions, kept, &self.sensors_m, &others)?;
+            for (c, (readings, noise_variance)) in channels.into_iter().zip(found) {
                 for (k, (reading, process)) in readings.into_iter().enumerate() {
                     let error = others.means[[k, c]] + others.centre[c] - reading;
-                    let noise = fit.noise_variance() * self.prior.relative_noise_of(&others, k);
+                    let noise = noise_variance * self.prior.relative_noise_of(&others, k);
                     errors.push([error * error, noise / others.count[k], process]);
                 }
             }

@@ -15,7 +15,7 @@ use crate::influence::config::Structure;
 use crate::influence::grid::{Axis, check_axes, greatest_distances};
 use crate::influence::inversion::Layers;
 use crate::influence::lanes::{Lanes, in_lanes};
-use crate::recording::{LEAST_FREEDOM, Recording};
+use crate::recording::LEAST_FREEDOM;
 use crate::setup::Setup;
 use crate::status::{Detection, Directions, FalseAlarmRate, NoiseBounds, unknowns};
 use palpate_core::{Estimate, Status};
@@ -44,7 +44,8 @@ pub(super) struct Tables {
 }
 
 impl Tables {
-    pub fn new(functions: &[Functions], noise_sd: Vec<f64>) -> Self {
+    pub fn new(functions: &[Functions]) -> Self {
+        let noise_sd: Vec<f64> = functions.iter().map(|found| found.noise_variance.sqrt()).collect();
         let places = functions.first().map_or(0, |functions| functions.values.len());
         let at_places = |of: fn(&Functions) -> &Vec<f64>, power: i32| -> Vec<f64> {
             let channels = || functions.iter().zip(&noise_sd);
@@ -73,6 +74,16 @@ impl Tables {
             list.retain(|_| index.next().is_some_and(|i: usize| i % channels != removed));
         }
         self
+    }
+
+    /// Returns whether the posterior variance of a contact's reading exceeds the noise at some node.
+    fn exceed_noise(&self, force_n: f64) -> bool {
+        let channels = self.offsets.len().max(1);
+        let variances = self.variances.iter().zip(&self.covariances).enumerate();
+        let of_contact = |(i, (v, beta)): (usize, (&f64, &f64))| {
+            self.offset_variances[i % channels] + force_n * (2.0 * beta + force_n * v)
+        };
+        variances.map(of_contact).any(|variance| variance > 1.0)
     }
 
     /// Returns whether the posterior variance of a contact's reading exceeds two channels' noise at half of
@@ -119,7 +130,7 @@ pub(super) struct Stored {
     pub noise_freedom: f64,
     #[serde(default)]
     pub false_alarm_rate: FalseAlarmRate,
-    /// Overdispersion: divisor of the log-likelihood.
+    /// Overdispersion: divisor of the log-likelihood; 1 but in older files.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub channels_as_one: f64,
     /// Loadings on common-mode errors.
@@ -164,6 +175,8 @@ pub struct ForceLinearLocator {
     /// Critical value of the square's reduction by a contact.
     detection_bound: f64,
     tells_untouched: bool,
+    /// Whether the calibration's variance of a contact exceeds the noise at some node.
+    pub(super) is_uncertain: bool,
 }
 
 /// Scatter of presses in proportion to their response, added to the noise.
@@ -206,6 +219,7 @@ impl Stored {
             noise_bound: 0.0,
             detection_bound: 0.0,
             tells_untouched: true,
+            is_uncertain: self.functions.exceed_noise(self.mean_force_n),
             stored: self,
         };
         locator.find_lengths();
@@ -327,15 +341,6 @@ struct Place<'a> {
 }
 
 impl ForceLinearLocator {
-    pub(super) fn with_likelihood_divided_by(self, factor: f64, recording: &Recording) -> Self {
-        let channels_as_one = factor * self.stored.channels_as_one;
-        let open =
-            Stored { channels_as_one, residual_limit: f64::INFINITY, spread_limit: None, ..self.stored };
-        let mut locator = open.into_locator();
-        locator.limit_residuals(recording);
-        locator
-    }
-
     pub(super) fn with_saturation(mut self, saturation: &Saturation, channels: &[usize]) -> Self {
         let range_of = |c: &usize| channels.binary_search(c).map_or(f64::MAX, |i| saturation.ranges[i]);
         let ranges = self.stored.live.iter().map(range_of).collect();

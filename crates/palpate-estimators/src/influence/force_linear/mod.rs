@@ -1,8 +1,11 @@
 //! Force-linear method: reading = offset + force · influence function of the position, learnt ([`learning`])
 //! and inverted ([`locator`]) without a model.
 
+mod averaging;
 mod beyond_presses;
 mod broad_scan;
+mod component;
+mod component_search;
 mod condensed;
 mod drift;
 mod drift_fit;
@@ -10,10 +13,10 @@ mod evidence;
 mod force_prior;
 mod influence_function;
 mod learning;
-mod left_out;
 mod likelihood;
 mod locator;
 mod missing_channel;
+mod noise_prior;
 mod outliers;
 mod place_noise;
 mod place_noise_search;
@@ -46,7 +49,6 @@ use learning::Learnt;
 use locator::{Stored, Tables};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::mean;
-use prior::Prior;
 use saturation_fit::Linearization;
 
 const LEAST_POSITIONS: usize = 2;
@@ -66,11 +68,7 @@ pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLin
     if structure == Structure::ForceSaturating {
         return fit_saturating(task);
     }
-    let Some(locator) = fit_condensed(task, structure, MOST_PRESSES)? else { return Ok(None) };
-    Ok(Some(match left_out::factor(task, structure, locator.presses())? {
-        Some(factor) => locator.with_likelihood_divided_by(factor, task.recording),
-        None => locator,
-    }))
+    fit_condensed(task, structure, MOST_PRESSES)
 }
 
 fn fit_saturating(task: FitTask) -> Result<Option<ForceLinearLocator>, MeasuredError> {
@@ -104,7 +102,7 @@ fn fit_condensed(
     if structure == Structure::Auto && !prior.is_separable() {
         return Ok(None);
     }
-    let axes = axes(presses, prior, extent);
+    let axes = axes(&learnt, extent);
     let [x, y] = axes;
     let places_m: Vec<Vec<f64>> = (0..x.count * y.count)
         .map(|place| {
@@ -119,7 +117,7 @@ fn fit_condensed(
         let coordinates = || positions_m.iter().map(|position_m| position_m[k]);
         (coordinates().fold(f64::INFINITY, f64::min), coordinates().fold(f64::NEG_INFINITY, f64::max))
     };
-    let functions = Tables::new(&functions, learnt.noise_sd());
+    let functions = Tables::new(&functions);
     let mut locator = Stored {
         x,
         y,
@@ -141,22 +139,13 @@ fn fit_condensed(
         presses: presses.len(),
         noise_freedom: presses.noise_freedom(),
         false_alarm_rate: FalseAlarmRate::DEFAULT,
-        channels_as_one: channels_as_one(presses),
+        channels_as_one: 1.0,
         drifts: learnt.drifts()?,
         saturation: None,
     }
     .into_locator();
     locator.limit_residuals(recording);
     Ok(Some(locator))
-}
-
-/// Divisor of the log-likelihood (overdispersion) for few presses, as channels share their hyperparameters.
-///
-/// The constants give 95 % coverage on strips with 5 to 24 presses.
-fn channels_as_one(presses: &CalibrationRows) -> f64 {
-    const FEWEST: f64 = 4.0;
-    const MOST: f64 = 1.8;
-    1.0 + left_out::weight(presses.len()) * ((presses.len() as f64 / FEWEST).clamp(1.0, MOST) - 1.0)
 }
 
 /// Offsets at the rows of `asked`; `None` without times, drift or separable influence functions.
@@ -183,13 +172,11 @@ pub(super) fn offset_course(
     Ok(Some(course))
 }
 
-fn axes(presses: &CalibrationRows, prior: &Prior, extent: Extent) -> [Axis; 2] {
-    let positions_m = presses.positions_m();
+fn axes(learnt: &Learnt, extent: Extent) -> [Axis; 2] {
+    let positions_m = learnt.pressed.positions_m();
     let axis = |k: usize, most: usize| {
         let values = positions_m.iter().map(|position_m| position_m[k]).collect();
-        // The singular part of a point sensor has no length scale.
-        let length_m = if prior.source.is_some() { 0.0 } else { prior.lengths_m[k] };
-        Axis::of_positions(values, (extent, k), length_m, most)
+        Axis::of_positions(values, (extent, k), learnt.finest_m(k), most)
     };
     match extent {
         Extent::Line { .. } => [axis(0, MOST_ALONG), Axis::NONE],

@@ -7,6 +7,7 @@
 
 use super::drift::END;
 use super::evidence::{ChannelFit, Evidence, Restricted, SourceFit, WhiteSources};
+use super::noise_prior::NoiseDensity;
 use super::prior::Prior;
 use crate::influence::calibration::CalibrationRows;
 use crate::influence::measured::MeasuredError;
@@ -17,12 +18,57 @@ use palpate_numerics::watch::Watch;
 #[derive(Clone, Debug)]
 pub(super) struct Functions {
     pub offset: f64,
+    pub noise_variance: f64,
     /// f at each position.
     pub values: Vec<f64>,
     pub offset_variance: f64,
     pub variances: Vec<f64>,
     /// Covariances of f with the offset.
     pub covariances: Vec<f64>,
+}
+
+impl Functions {
+    /// Mean and covariance of a mixture, with probabilities that sum to 1.
+    pub fn averaged(mixture: &[(f64, Self)]) -> Self {
+        let places = mixture.first().map_or(0, |(_, functions)| functions.values.len());
+        let mean_of = |value: &dyn Fn(&Self) -> f64| {
+            mixture.iter().map(|(weight, own)| weight * value(own)).sum::<f64>()
+        };
+        let offset = mean_of(&|own| own.offset);
+        let values: Vec<f64> = (0..places).map(|k| mean_of(&|own| own.values[k])).collect();
+        let variance = |k: usize| mean_of(&|own| own.variances[k] + (own.values[k] - values[k]).powi(2));
+        let covariance = |k: usize| {
+            mean_of(&|own| own.covariances[k] + (own.values[k] - values[k]) * (own.offset - offset))
+        };
+        Self {
+            offset,
+            noise_variance: mean_of(&|own| own.noise_variance),
+            offset_variance: mean_of(&|own| own.offset_variance + (own.offset - offset).powi(2)),
+            variances: (0..places).map(variance).collect(),
+            covariances: (0..places).map(covariance).collect(),
+            values,
+        }
+    }
+}
+
+/// Hyperparameters that the posterior of some channels is conditioned on.
+pub(super) struct Conditions<'a> {
+    pub prior: &'a Prior,
+    /// ρ.
+    pub ratio: f64,
+    /// Channels, with s² where it is not averaged.
+    pub channels: Vec<(usize, Option<f64>)>,
+    /// Noise of every channel; empty where s² is given.
+    pub densities: &'a [NoiseDensity],
+}
+
+impl<'a> Conditions<'a> {
+    /// Those of `channels` with fits of equal ρ.
+    pub fn of_fits(prior: &'a Prior, fits: &[ChannelFit], channels: &[usize]) -> Self {
+        let ratio = channels.first().map_or(1.0, |c| fits[*c].ratio);
+        let channels = channels.iter().map(|c| (*c, Some(fits[*c].signal))).collect();
+        Self { prior, ratio, channels, densities: &[] }
+    }
 }
 
 /// Groups channels of equal ρ, which share one factorization.
@@ -111,24 +157,24 @@ struct Moments {
     with_first: f64,
 }
 
-/// Offsets and influences of unit response, for channels of equal ρ.
+/// Offsets and influences of unit response.
 pub(super) fn functions(
-    prior: &Prior,
+    conditions: &Conditions,
     presses: &CalibrationRows,
-    channels: &[(usize, &ChannelFit)],
     sensors_m: &[Vec<f64>],
     places_m: &[Vec<f64>],
     watch: Watch,
 ) -> Result<Vec<Functions>, MeasuredError> {
-    let told = Posterior::new(prior, presses, channels, sensors_m)?;
-    let empty = |c: usize| Functions {
-        offset: presses.centre[c],
+    let told = Posterior::new(conditions, presses, sensors_m)?;
+    let empty = |channel: &Told| Functions {
+        offset: presses.centre[channel.c],
+        noise_variance: channel.signal * conditions.ratio,
         values: Vec::with_capacity(places_m.len()),
         offset_variance: 0.0,
         variances: Vec::with_capacity(places_m.len()),
         covariances: Vec::with_capacity(places_m.len()),
     };
-    let mut functions: Vec<Functions> = channels.iter().map(|(c, _)| empty(*c)).collect();
+    let mut functions: Vec<Functions> = told.channels.iter().map(empty).collect();
     for block in places_m.chunks(BLOCK) {
         watch.round()?;
         let influences = block.iter().map(Functional::influence);
@@ -147,20 +193,21 @@ pub(super) fn functions(
     Ok(functions)
 }
 
-/// Noiseless readings of `others`, for channels of equal ρ.
+/// Means and variances of the readings of `others`, without noise, and the noise variance.
 pub(super) fn readings(
-    prior: &Prior,
+    conditions: &Conditions,
     presses: &CalibrationRows,
-    channels: &[(usize, &ChannelFit)],
     sensors_m: &[Vec<f64>],
     others: &CalibrationRows,
-) -> Result<Vec<Vec<(f64, f64)>>, MeasuredError> {
-    let told = Posterior::new(prior, presses, channels, sensors_m)?;
-    let moments = told.moments(&Functional::readings(prior, others));
-    let of_channel = |((c, _), moments): (&(usize, &ChannelFit), Vec<Moments>)| {
-        moments.iter().map(|moments| (presses.centre[*c] + moments.mean, moments.variance)).collect()
+) -> Result<Vec<(Vec<(f64, f64)>, f64)>, MeasuredError> {
+    let told = Posterior::new(conditions, presses, sensors_m)?;
+    let moments = told.moments(&Functional::readings(conditions.prior, others));
+    let of_channel = |(channel, moments): (&Told, Vec<Moments>)| {
+        let centre = presses.centre[channel.c];
+        let readings = moments.iter().map(|moments| (centre + moments.mean, moments.variance)).collect();
+        (readings, channel.signal * conditions.ratio)
     };
-    Ok(channels.iter().zip(moments).map(of_channel).collect())
+    Ok(told.channels.iter().zip(moments).map(of_channel).collect())
 }
 
 pub(super) fn offsets(
@@ -173,8 +220,8 @@ pub(super) fn offsets(
     let asked: Vec<Functional> = times.iter().map(|time| Functional::offset_at(*time)).collect();
     let mut all = vec![Vec::new(); fits.len()];
     for channels in of_equal_ratio(fits) {
-        let of_group: Vec<_> = channels.iter().map(|c| (*c, &fits[*c])).collect();
-        let told = Posterior::new(prior, presses, &of_group, sensors_m)?;
+        let conditions = Conditions::of_fits(prior, fits, &channels);
+        let told = Posterior::new(&conditions, presses, sensors_m)?;
         for block in asked.chunks(BLOCK) {
             for (c, moments) in channels.iter().zip(told.moments(block)) {
                 let mean_and_variance = |found: &Moments| (presses.centre[*c] + found.mean, found.variance);
@@ -194,18 +241,19 @@ struct Posterior<'a> {
 
 impl<'a> Posterior<'a> {
     fn new(
-        prior: &'a Prior,
+        conditions: &Conditions<'a>,
         presses: &'a CalibrationRows,
-        channels: &[(usize, &ChannelFit)],
         sensors_m: &[Vec<f64>],
     ) -> Result<Self, MeasuredError> {
-        let evidence = Evidence::new(presses, prior, sensors_m);
-        let known = Known::new(&evidence, channels.first().map_or(1.0, |(_, fit)| fit.ratio))?;
+        let Conditions { prior, ratio, ref channels, densities } = *conditions;
+        let evidence = Evidence::new(presses, prior, sensors_m).with_noise(densities);
+        let known = Known::new(&evidence, ratio)?;
         let coarse = Sources::new(&evidence, &known, sensors_m.to_vec());
-        let channels = channels
-            .iter()
-            .map(|(c, fit)| Told { c: *c, signal: fit.signal, sources: coarse.closer(&evidence, &known, *c) })
-            .collect();
+        let channel = |(c, signal): &(usize, Option<f64>)| {
+            let sources = coarse.closer(&evidence, &known, *c);
+            Told { c: *c, signal: signal.unwrap_or(sources.signal), sources }
+        };
+        let channels = channels.iter().map(channel).collect();
         Ok(Self { prior, presses, known, channels })
     }
 
@@ -273,13 +321,16 @@ struct Sources {
     /// Coefficients of H for L⁻¹·u.
     coefficients: Array2<f64>,
     fits: Vec<SourceFit>,
+    /// s², averaged over the sources.
+    signal: f64,
 }
 
 impl Sources {
     fn new(evidence: &Evidence, known: &Known, sensors_m: Vec<Vec<f64>>) -> Self {
         let columns = evidence.prior.sources(evidence.presses, &sensors_m);
         let (white, coefficients) = known.restricted.residuals(columns);
-        Self { sensors_m, white: WhiteSources::new(white), coefficients, fits: Vec::new() }
+        let white = WhiteSources::new(white, &evidence.amplitudes(known.ratio));
+        Self { sensors_m, white, coefficients, fits: Vec::new(), signal: 1.0 }
     }
 
     fn fitted(self, evidence: &Evidence, known: &Known, c: usize) -> Self {
@@ -287,7 +338,7 @@ impl Sources {
         let products = self.white.products(&white);
         let sources = (&self.white, &products.column(0));
         let fit = evidence.channel(&known.restricted, known.ratio, c, &white.column(0), sources);
-        Self { fits: fit.sources, ..self }
+        Self { fits: fit.sources, signal: fit.signal, ..self }
     }
 
     /// Refines positions until the presses hardly resolve neighbours.

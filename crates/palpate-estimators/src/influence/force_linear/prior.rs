@@ -46,11 +46,13 @@ impl Source {
         }
     }
 
-    /// g at `way` from sensor to load, in lengths of the surface.
-    fn singular_part(self, way: &[f64]) -> f64 {
+    /// g at `way` from sensor to load, averaged along a line over a normal distribution of the standard
+    /// deviation `radius`; all in lengths of the surface.
+    fn singular_part(self, way: &[f64], radius: f64) -> f64 {
         /// Sensor size, which bounds a plate's curvature.
         const SIZE: f64 = 0.01;
         match (self, way) {
+            (_, [d]) if radius > 0.0 => self.spread_along(*d, radius),
             (Self::Strain, [d]) => d.abs(),
             (Self::Slope, [d]) => d * d.abs(),
             (Self::Deflection, [d]) => d.abs().powi(3),
@@ -61,6 +63,26 @@ impl Source {
             }
         }
     }
+
+    /// Mean of g(d + z) over normal z of the standard deviation `radius`: moments of a folded normal
+    /// distribution.
+    fn spread_along(self, d: f64, radius: f64) -> f64 {
+        let (sign, density) = {
+            let relative = d / radius;
+            let density = (2.0 / std::f64::consts::PI).sqrt() * (-0.5 * relative * relative).exp();
+            (libm::erf(relative * std::f64::consts::FRAC_1_SQRT_2), density)
+        };
+        let square = radius * radius;
+        match self {
+            Self::Strain => d * sign + radius * density,
+            Self::Slope => (d * d + square) * sign + d * radius * density,
+            Self::Deflection => d * (d * d + 3.0 * square) * sign + radius * (d * d + 2.0 * square) * density,
+        }
+    }
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -75,6 +97,10 @@ pub(super) struct Prior {
     pub smooth_part: f64,
     /// `None` for smooth influences.
     pub source: Option<Source>,
+    /// Standard deviation of the load's distribution along a line, as under a soft layer, in lengths of the
+    /// surface.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub load_radius: f64,
     /// δ: relative change of an influence with force.
     pub nonlinearity: f64,
     /// γ.
@@ -102,6 +128,7 @@ impl Prior {
             lengths_m: spans_m.map(|span_m| 0.25 * span_m).collect(),
             smooth_part: 1.0,
             source: None,
+            load_radius: 0.0,
             nonlinearity: 0.0,
             response: 1.0,
             drift: 0.0,
@@ -158,8 +185,13 @@ impl Prior {
         };
         LocatorFault::check_count("length scales", self.extent.dimensions(), self.lengths_m.len())?;
         numbers("length scale", &self.lengths_m, |length| length > 0.0, "finite and greater than 0")?;
-        let shares = [self.smooth_part, self.nonlinearity, self.drift, self.scatter];
-        numbers("smooth part, nonlinearity, drift or scatter", &shares, |share| share >= 0.0, "at least 0")?;
+        let shares = [self.smooth_part, self.load_radius, self.nonlinearity, self.drift, self.scatter];
+        numbers(
+            "smooth part, load radius, nonlinearity, drift or scatter",
+            &shares,
+            |share| share >= 0.0,
+            "at least 0",
+        )?;
         numbers("exponent of the response", &[self.response], |exponent| exponent > 0.0, "greater than 0")?;
         numbers("force", &[self.force_scale_n], |force| force > 0.0, "greater than 0")?;
         self.noise_by_place.as_ref().map_or(Ok(()), |noise| noise.check(self.extent.dimensions()))
@@ -276,7 +308,7 @@ impl Prior {
         let at = |sensor_m: &Vec<f64>| {
             let ways = place_m.iter().zip(sensor_m).map(|(a, p)| (a - p) * scale);
             way.iter_mut().zip(ways).for_each(|(out, d)| *out = d);
-            source.singular_part(&way)
+            source.singular_part(&way, self.load_radius)
         };
         sensors_m.iter().map(at).collect()
     }

@@ -233,9 +233,9 @@ impl Explain for Seen<'_> {
         }
     }
 
-    /// For few presses variances change too much between nodes.
+    /// Large variances of the calibration change too much between nodes.
     fn bounds_are_loose(&self) -> bool {
-        !self.locator.shared.is_empty() || self.locator.stored.channels_as_one > 1.0
+        !self.locator.shared.is_empty() || self.locator.is_uncertain
     }
 
     fn lengths(&self, [x, y]: [usize; 2], response_n: f64) -> [f64; 2] {

@@ -1,0 +1,116 @@
+//! Prior of the channels' noise variances, which few presses without repeats do not determine one by one.
+//!
+//! The variance of channel c has a scaled inverse χ² distribution with ν₀ = 2 degrees of freedom and scale
+//! s₀²·u_c² (Gelman et al., *Bayesian Data Analysis*, 2013, section 2.6; Smyth, Statistical Applications in
+//! Genetics and Molecular Biology 3, 2004): channels are alike within about a factor of three. The unit u_c is
+//! the channel's signal, for equal signal-to-noise ratios, or common, for equal noise. Units and scales are
+//! averaged by their evidence.
+
+use crate::influence::calibration::CalibrationRows;
+use palpate_numerics::{mean, mean_and_variance};
+use std::f64::consts::PI;
+
+/// ν₀.
+const FREEDOM: f64 = 2.0;
+
+/// Prior of all channels' noise variances.
+pub(super) struct NoisePrior {
+    /// s₀²·u_c².
+    pub scales: Vec<f64>,
+}
+
+impl NoisePrior {
+    /// Equal noise or equal signal-to-noise ratios, from a tenth to 10⁻⁵ of the signal.
+    pub fn candidates(presses: &CalibrationRows) -> Vec<Self> {
+        const DECADES: std::ops::RangeInclusive<i32> = -5..=-1;
+        let signals = signal_variances(presses);
+        let common = mean(signals.iter().map(|signal| signal.ln())).exp();
+        let units = [signals.clone(), vec![common; signals.len()]];
+        let scaled = |unit: &Vec<f64>, decade: i32| Self {
+            scales: unit.iter().map(|variance| variance * 10f64.powi(2 * decade)).collect(),
+        };
+        units.iter().flat_map(|unit| DECADES.map(move |decade| scaled(unit, decade))).collect()
+    }
+}
+
+/// Variance of each channel's readings.
+pub(super) fn signal_variances(presses: &CalibrationRows) -> Vec<f64> {
+    let channels = presses.means.columns().into_iter();
+    channels.map(|channel| mean_and_variance(channel.iter().copied()).1.max(f64::MIN_POSITIVE)).collect()
+}
+
+/// Student's t density of a residue of ν degrees of freedom under one prior, as a function of its square:
+/// constant − ½·(ν₀ + ν)·ln(ν₀·scale + square).
+#[derive(Clone, Copy)]
+pub(super) struct ResidueDensity {
+    constant: f64,
+    power: f64,
+    /// ν₀ times the scale.
+    prior: f64,
+}
+
+impl ResidueDensity {
+    pub fn new(scale: f64, freedom: f64) -> Self {
+        let prior = FREEDOM * scale;
+        let power = 0.5 * (FREEDOM + freedom);
+        let constant = libm::lgamma(power) - libm::lgamma(0.5 * FREEDOM) - 0.5 * freedom * PI.ln()
+            + 0.5 * FREEDOM * prior.ln();
+        Self { constant, power, prior }
+    }
+
+    pub fn log_of(&self, square: f64) -> f64 {
+        self.constant - self.power * (self.prior + square).ln()
+    }
+
+    /// Logarithm of the mean density of residues with the squares and weights `residues`, given by the least square.
+    ///
+    /// The power is an integer or half of one, so that no residue needs a logarithm.
+    pub fn log_mean_of(&self, residues: &[(f64, f64)], least: f64) -> f64 {
+        let doubled = (2.0 * self.power).round() as i32;
+        let relative = |square: f64| (self.prior + least) / (self.prior + square);
+        let power = |relative: f64| {
+            let whole = relative.powi(doubled / 2);
+            if doubled % 2 == 0 { whole } else { whole * relative.sqrt() }
+        };
+        let sum: f64 = residues.iter().map(|(square, weight)| weight * power(relative(*square))).sum();
+        self.log_of(least) + (sum / residues.len() as f64).ln()
+    }
+
+    /// Posterior mean of the noise variance.
+    fn noise_variance(&self, square: f64) -> f64 {
+        (self.prior + square) / (2.0 * self.power - 2.0)
+    }
+}
+
+/// Mixture of [`NoisePrior`]s of one channel.
+#[derive(Clone, Debug, Default)]
+pub(super) struct NoiseDensity {
+    /// ln of the weight, and the scale s₀²·u_c².
+    pub terms: Vec<(f64, f64)>,
+}
+
+/// Density of the residues of one channel under a mixture of noise priors.
+pub(super) struct ResidueMixture {
+    terms: Vec<(f64, ResidueDensity)>,
+    /// ½·ν.
+    half_freedom: f64,
+}
+
+impl ResidueMixture {
+    pub fn new(noise: &NoiseDensity, freedom: f64) -> Self {
+        let term = |(log_weight, scale): &(f64, f64)| (*log_weight, ResidueDensity::new(*scale, freedom));
+        Self { terms: noise.terms.iter().map(term).collect(), half_freedom: 0.5 * freedom }
+    }
+
+    /// Log density of a squared residue over s², and the posterior mean of s².
+    pub fn of_residue(&self, square: f64, ratio: f64) -> (f64, f64) {
+        let square = ratio * square;
+        let log = |(log_weight, density): &(f64, ResidueDensity)| log_weight + density.log_of(square);
+        let most = self.terms.iter().map(log).fold(f64::NEG_INFINITY, f64::max);
+        let (sum, variance) = self.terms.iter().fold((0.0, 0.0), |(sum, variance), term| {
+            let weight = (log(term) - most).exp();
+            (sum + weight, variance + weight * term.1.noise_variance(square))
+        });
+        (most + sum.ln() + self.half_freedom * ratio.ln(), variance / sum / ratio)
+    }
+}
