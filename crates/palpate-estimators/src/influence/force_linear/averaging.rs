@@ -3,8 +3,9 @@
 
 use super::component::{Component, log_sum_exp};
 use super::noise_prior::{NoiseDensity, NoisePrior};
-use super::posterior::{Conditions, Functions, functions, readings};
+use super::posterior::{Conditions, Functions, functions};
 use super::prior::Prior;
+use super::systematic_sample::systematic_sample;
 use crate::influence::calibration::CalibrationRows;
 use crate::influence::measured::MeasuredError;
 use palpate_numerics::watch::Watch;
@@ -31,33 +32,18 @@ struct Member {
     densities: Vec<NoiseDensity>,
 }
 
-/// Held-out readings of one channel.
-pub(super) struct HeldOut {
-    /// Means and variances without noise.
-    pub readings: Vec<(f64, f64)>,
-    pub noise_variance: f64,
-}
-
 impl Average {
-    /// Averages a systematic sample of the components (Kitagawa, Journal of Computational and Graphical
-    /// Statistics 5, 1996).
+    /// Averages a systematic sample of the components.
     pub fn new(components: &[Component], noises: &[NoisePrior]) -> Self {
         let logs: Vec<f64> = components.iter().map(Component::log_evidence).collect();
         let all = log_sum_exp(logs.iter().copied());
         let channels = components.first().map_or(0, |component| component.log_densities.dim().0);
-        let mut members = Vec::new();
-        let (mut passed, mut drawn) = (0.0, 0);
-        for (component, log) in components.iter().zip(logs) {
-            passed += (log - all).exp();
-            let before = drawn;
-            while drawn < SAMPLE && (drawn as f64 + 0.5) / (SAMPLE as f64) < passed {
-                drawn += 1;
-            }
-            if drawn > before {
-                let share = (drawn - before) as f64 / SAMPLE as f64;
-                members.extend(Member::of_component(component, noises, share));
-            }
-        }
+        let drawn = systematic_sample(logs.iter().map(|log| (log - all).exp()), SAMPLE);
+        let drawn = components.iter().zip(drawn).filter(|(_, drawn)| *drawn > 0);
+        let members_of = |(component, drawn): (&Component, usize)| {
+            Member::of_component(component, noises, drawn as f64 / SAMPLE as f64)
+        };
+        let mut members: Vec<Member> = drawn.flat_map(members_of).collect();
         for c in 0..channels {
             let sum: f64 = members.iter().map(|member| member.probabilities[c]).sum();
             members.iter_mut().for_each(|member| member.probabilities[c] /= sum);
@@ -82,35 +68,6 @@ impl Average {
             }
         }
         Ok(mixtures.iter().map(|mixture| Functions::averaged(mixture)).collect())
-    }
-
-    /// Predictions of `others` from `presses`, by channel.
-    pub fn held_out(
-        &self,
-        presses: &CalibrationRows,
-        sensors_m: &[Vec<f64>],
-        others: &CalibrationRows,
-        watch: Watch,
-    ) -> Result<Vec<HeldOut>, MeasuredError> {
-        let empty = || HeldOut { readings: vec![(0.0, 0.0); others.len()], noise_variance: 0.0 };
-        let mut moments: Vec<HeldOut> = (0..self.channels).map(|_| empty()).collect();
-        for member in &self.members {
-            watch.round()?;
-            let conditions = member.conditions();
-            let found = readings(&conditions, presses, member.sensors_m(sensors_m), others)?;
-            for ((c, _), (readings, noise_variance)) in conditions.channels.iter().zip(found) {
-                let (weight, own) = (member.probabilities[*c], &mut moments[*c]);
-                own.noise_variance += weight * noise_variance;
-                for ((first, second), (mean, variance)) in own.readings.iter_mut().zip(readings) {
-                    *first += weight * mean;
-                    *second += weight * (variance + mean * mean);
-                }
-            }
-        }
-        for (first, second) in moments.iter_mut().flat_map(|own| &mut own.readings) {
-            *second = (*second - *first * *first).max(0.0);
-        }
-        Ok(moments)
     }
 
     pub fn has_source(&self) -> bool {

@@ -38,7 +38,7 @@ impl Component {
             let Ok(restricted) = evidence.restricted(*ratio) else { continue };
             let (white, _) = restricted.residuals(presses.means.clone());
             let taus: Vec<f64> = amplitudes_over_noise().map(|tau| tau * ratio).collect();
-            let columns = restricted.residuals(prior.sources(presses, sensors_m)).0;
+            let columns = restricted.residuals(evidence.sources.clone()).0;
             let sources = WhiteSources::new(columns, &taus);
             let products = sources.products(&white.view());
             for c in 0..channels {

@@ -10,6 +10,7 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::regression::Kernel;
 use palpate_numerics::watch::{Cancelled, Watch};
 use std::collections::{HashMap, VecDeque};
+use std::ops::RangeInclusive;
 
 /// Ratio of neighbouring length scales.
 const STEP: f64 = 1.6;
@@ -97,7 +98,7 @@ impl ComponentSearch<'_> {
     fn neighbours(&self, start: Option<Component>) -> Result<Vec<Component>, Cancelled> {
         let Some(start) = start else { return Ok(Vec::new()) };
         let first = start.prior.clone();
-        let longest_m = 10.0 * first.extent.length_m();
+        let range_m = length_range_m(&first);
         let origin = vec![0; if first.source.is_some() { 1 } else { first.lengths_m.len() }];
         let mut best = start.log_evidence();
         let mut found: HashMap<Vec<i32>, Option<Component>> = HashMap::from([(origin.clone(), Some(start))]);
@@ -122,7 +123,7 @@ impl ComponentSearch<'_> {
                     for (k, length_m) in prior.lengths_m.iter_mut().enumerate() {
                         *length_m *= STEP.powi(next[k.min(next.len() - 1)]);
                     }
-                    let is_within = |length_m: &f64| (1e-4 * longest_m..=longest_m).contains(length_m);
+                    let is_within = |length_m: &f64| range_m.contains(length_m);
                     let component = match prior.lengths_m.iter().all(is_within) {
                         true => self.of_ratios(prior, ratios.clone())?,
                         false => None,
@@ -143,13 +144,26 @@ impl ComponentSearch<'_> {
         Ok(found.into_iter().map(|(_, component)| component).collect())
     }
 
-    /// The component at twice as many ratios.
+    /// The component at twice as many ratios, where few are probable.
     fn refined(&self, component: Component) -> Result<Option<Component>, Cancelled> {
+        const FEW: usize = 4;
         let (low, high) = component.probable_ratios(1e-3);
+        if high - low >= FEW {
+            return Ok(Some(component));
+        }
         let log = |r: usize| 2 * component.ratios[r].log10().round() as i32;
         let halves = log(low) - 1..=log(high) + 1;
         let ratios = halves.map(|half| 10f64.powf(0.5 * f64::from(half))).collect();
         self.of_ratios(component.prior, ratios)
+    }
+}
+
+/// Length scales with other influence functions than their limits, white noise and polynomials.
+fn length_range_m(prior: &Prior) -> RangeInclusive<f64> {
+    let length_m = prior.extent.length_m();
+    match prior.source {
+        Some(_) => 0.05 * length_m..=2.0 * length_m,
+        None => 1e-3 * length_m..=10.0 * length_m,
     }
 }
 

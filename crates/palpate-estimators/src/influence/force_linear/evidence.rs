@@ -11,6 +11,7 @@
 
 use super::noise_prior::{NoiseDensity, ResidueMixture};
 use super::prior::Prior;
+use super::systematic_sample::systematic_sample;
 use crate::influence::calibration::{CalibrationRows, Repeats};
 use ndarray::linalg::general_mat_mul;
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
@@ -120,7 +121,7 @@ pub(super) struct Evidence<'a> {
     /// Noise and drift, over ρ.
     noise: Noise,
     effects: Array2<f64>,
-    sources: Array2<f64>,
+    pub sources: Array2<f64>,
     repeats: RepeatedNoise,
     noise_priors: Vec<FlatNoise>,
     /// Noise variance of each channel; empty for the most probable noise.
@@ -430,21 +431,15 @@ fn average(ratio: f64, tried: &[(f64, f64, Option<SourceFit>)]) -> ChannelFit {
 fn sampled(ratio: f64, tried: &[(f64, f64, Option<SourceFit>)]) -> ChannelFit {
     const SAMPLE: usize = 100;
     let best = tried.iter().fold(f64::NEG_INFINITY, |best, (evidence, ..)| best.max(*evidence));
-    let weight = |evidence: f64| (evidence - best).exp();
-    let all: f64 = tried.iter().map(|(evidence, ..)| weight(*evidence)).sum();
-    let signal = tried.iter().map(|(evidence, signal, _)| weight(*evidence) / all * signal).sum();
-    let (mut passed, mut drawn) = (0.0, 0);
-    let mut sources = Vec::new();
-    for (evidence, _, source) in tried {
-        passed += weight(*evidence) / all;
-        let before = drawn;
-        while drawn < SAMPLE && (drawn as f64 + 0.5) / (SAMPLE as f64) < passed {
-            drawn += 1;
-        }
-        if drawn > before {
-            let weight = (drawn - before) as f64 / SAMPLE as f64;
-            sources.extend(source.map(|source| SourceFit { weight, ..source }));
-        }
-    }
+    let weights: Vec<f64> = tried.iter().map(|(evidence, ..)| (evidence - best).exp()).collect();
+    let all: f64 = weights.iter().sum();
+    let signal =
+        tried.iter().zip(&weights).map(|((_, signal, _), weight)| weight * signal).sum::<f64>() / all;
+    let drawn = systematic_sample(weights.iter().map(|weight| weight / all), SAMPLE);
+    let with_weight = |((.., source), drawn): (&(f64, f64, Option<SourceFit>), usize)| {
+        let weight = drawn as f64 / SAMPLE as f64;
+        source.filter(|_| drawn > 0).map(|source| SourceFit { weight, ..source })
+    };
+    let sources = tried.iter().zip(drawn).filter_map(with_weight).collect();
     ChannelFit { ratio, signal, evidence: best + (all / tried.len() as f64).ln(), sources }
 }

@@ -3,7 +3,7 @@
 //! Smooth functions and point sensors at unknown positions ([`Prior::source`]) compete at held-out positions,
 //! with hyperparameters of largest log evidence.
 
-use super::averaging::{Average, HeldOut};
+use super::averaging::Average;
 use super::component_search::ComponentSearch;
 use super::drift::{DriftCourse, END, START};
 use super::drift_fit::DriftFit;
@@ -32,6 +32,8 @@ pub(crate) const MOST_SEARCHED: usize = 150;
 /// Most presses of a fit, with time cubic in their number; more are condensed.
 pub(crate) const MOST_PRESSES: usize = 1000;
 const LEAST_TO_JUDGE: usize = 6;
+/// With fewer positions, the hyperparameters' uncertainty determines the errors.
+const LEAST_TO_WIDEN: usize = 19;
 /// Every fifth position is held out.
 pub(crate) const FOLDS: usize = 5;
 
@@ -104,7 +106,6 @@ impl Learnt {
         let search =
             ComponentSearch { presses: &searched, noises: &noises, sensors_m: &self.everywhere_m, watch };
         self.average = Average::new(&search.found(&self.prior, &self.lengths_m)?, &noises);
-        self.widening = self.held_out_widening(watch)?;
         Ok(())
     }
 
@@ -191,7 +192,7 @@ impl Learnt {
         }
         let lengths_m = judged[0].found.prior.lengths_m.clone();
         let best = judged.into_iter().max_by(|a, b| a.score.total_cmp(&b.score));
-        let Some(Judged { found: Found { prior, fits, sensors_m }, .. }) = best else {
+        let Some(Judged { found: Found { prior, fits, sensors_m }, widening, .. }) = best else {
             return Ok(None);
         };
         let set_aside = set_aside.to_vec();
@@ -206,7 +207,7 @@ impl Learnt {
             lengths_m,
             average: Average::default(),
             everywhere_m: everywhere(extent),
-            widening: 1.0,
+            widening,
             set_aside,
         }))
     }
@@ -327,6 +328,7 @@ struct Found {
 struct Judged {
     found: Found,
     score: f64,
+    widening: f64,
 }
 
 impl Judged {
@@ -341,8 +343,21 @@ impl Judged {
             -0.5 * (variance.ln() + square / variance)
         };
         let score = errors.iter().map(score).sum();
-        Ok(Self { found, score })
+        let is_judged = presses.positions_m().len() >= LEAST_TO_WIDEN;
+        let widening = if is_judged { widening(&errors) } else { 1.0 };
+        Ok(Self { found, score, widening })
     }
+}
+
+/// Factor of the process's variance that makes squared errors as large as their variances.
+fn widening(errors: &[[f64; 3]]) -> f64 {
+    const MOST: f64 = 25.0;
+    let too_small = |widening: f64| {
+        let standardized =
+            errors.iter().map(|[square, noise, process]| square / (noise + widening * process));
+        standardized.sum::<f64>() > errors.len() as f64
+    };
+    bisect((1.0, MOST), 30, too_small)
 }
 
 /// Presses held out and the others, by [`FOLDS`] positions; empty with few positions.
@@ -359,41 +374,6 @@ fn folds(presses: &CalibrationRows) -> Vec<(Vec<usize>, Vec<usize>)> {
 }
 
 impl Learnt {
-    /// Variance factor that makes errors at held-out positions as large as predicted.
-    fn held_out_widening(&self, watch: Watch) -> Result<f64, MeasuredError> {
-        const MOST: f64 = 25.0;
-        /// With fewer positions, the hyperparameters' uncertainty determines the errors.
-        const LEAST_POSITIONS: usize = 19;
-        let presses = &self.presses;
-        if presses.positions_m().len() < LEAST_POSITIONS {
-            return Ok(1.0);
-        }
-        // Squared errors with the variances of noise and process.
-        let mut errors: Vec<[f64; 3]> = Vec::new();
-        for (held, kept) in folds(presses) {
-            let (others, kept) = (presses.select(&held), presses.select(&kept));
-            let found = match self.average.held_out(&kept, &self.everywhere_m, &others, watch) {
-                Ok(found) => found,
-                // Without the held-out positions the polynomials are unidentifiable.
-                Err(MeasuredError::Noise(_)) => continue,
-                Err(error) => return Err(error),
-            };
-            for (c, HeldOut { readings, noise_variance }) in found.into_iter().enumerate() {
-                for (k, (reading, process)) in readings.into_iter().enumerate() {
-                    let error = others.means[[k, c]] + others.centre[c] - reading;
-                    let noise = noise_variance * self.prior.relative_noise_of(&others, k);
-                    errors.push([error * error, noise / others.count[k], process]);
-                }
-            }
-        }
-        let too_small = |widening: f64| {
-            let standardized =
-                errors.iter().map(|[square, noise, process]| square / (noise + widening * process));
-            standardized.sum::<f64>() > errors.len() as f64
-        };
-        Ok(if errors.is_empty() { 1.0 } else { bisect((1.0, MOST), 30, too_small) })
-    }
-
     /// Length scale of the finest influence functions along an axis; 0 with point sensors, which have none.
     pub fn finest_m(&self, k: usize) -> f64 {
         if self.average.has_source() { 0.0 } else { self.average.shortest_m(k) }

@@ -28,6 +28,7 @@ mod saturation_fit;
 mod scan;
 mod seen;
 mod shared_errors;
+mod systematic_sample;
 
 pub use drift::DriftCourse;
 pub(crate) use learning::{FOLDS, MOST_PRESSES, MOST_SEARCHED};

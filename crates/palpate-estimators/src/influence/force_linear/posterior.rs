@@ -248,7 +248,8 @@ impl<'a> Posterior<'a> {
         let Conditions { prior, ratio, ref channels, densities } = *conditions;
         let evidence = Evidence::new(presses, prior, sensors_m).with_noise(densities);
         let known = Known::new(&evidence, ratio)?;
-        let coarse = Sources::new(&evidence, &known, sensors_m.to_vec());
+        let columns = evidence.sources.clone();
+        let coarse = Sources::of_columns(&evidence, &known, sensors_m.to_vec(), columns);
         let channel = |(c, signal): &(usize, Option<f64>)| {
             let sources = coarse.closer(&evidence, &known, *c);
             Told { c: *c, signal: signal.unwrap_or(sources.signal), sources }
@@ -328,6 +329,16 @@ struct Sources {
 impl Sources {
     fn new(evidence: &Evidence, known: &Known, sensors_m: Vec<Vec<f64>>) -> Self {
         let columns = evidence.prior.sources(evidence.presses, &sensors_m);
+        Self::of_columns(evidence, known, sensors_m, columns)
+    }
+
+    /// Sources with the readings `columns`.
+    fn of_columns(
+        evidence: &Evidence,
+        known: &Known,
+        sensors_m: Vec<Vec<f64>>,
+        columns: Array2<f64>,
+    ) -> Self {
         let (white, coefficients) = known.restricted.residuals(columns);
         let white = WhiteSources::new(white, &evidence.amplitudes(known.ratio));
         Self { sensors_m, white, coefficients, fits: Vec::new(), signal: 1.0 }
