@@ -7,14 +7,17 @@
 use super::evidence::{Evidence, WhiteSources, amplitudes_over_noise};
 use super::noise_prior::{NoisePrior, ResidueDensity, signal_variances};
 use super::prior::Prior;
+use super::source_grid::SourceGrid;
 use crate::influence::calibration::CalibrationRows;
-use ndarray::{Array3, Axis as Dimension, s};
+use ndarray::{Array2, Array3, Axis as Dimension, s};
 
 pub(super) struct Component {
     pub prior: Prior,
     pub ratios: Vec<f64>,
     /// ln p(readings of channel c | ρ, noise prior k) at [c, k, ρ].
     pub log_densities: Array3<f64>,
+    /// Largest log density of channel c with a source at place p, up to a constant of the channel, at [c, p].
+    of_places: Array2<f64>,
 }
 
 impl Component {
@@ -23,9 +26,10 @@ impl Component {
         presses: &CalibrationRows,
         prior: Prior,
         noises: &[NoisePrior],
-        sensors_m: &[Vec<f64>],
+        grid: &SourceGrid,
         ratios: Vec<f64>,
     ) -> Option<Self> {
+        let sensors_m = if prior.source.is_some() { &grid.places_m[..] } else { &[] };
         let evidence = Evidence::new(presses, &prior, sensors_m);
         let freedom = evidence.freedom();
         if freedom < 1.0 {
@@ -34,6 +38,9 @@ impl Component {
         let channels = presses.centre.len();
         let units = signal_variances(presses);
         let mut log_densities = Array3::from_elem((channels, noises.len(), ratios.len()), f64::NEG_INFINITY);
+        let mut of_places = Array2::from_elem((channels, sensors_m.len()), f64::NEG_INFINITY);
+        // Cells that are not evaluated have no probability.
+        let evaluated = if sensors_m.is_empty() { 0.0 } else { (sensors_m.len() as f64 / grid.cells).ln() };
         for (r, ratio) in ratios.iter().enumerate() {
             let Ok(restricted) = evidence.restricted(*ratio) else { continue };
             let (white, _) = restricted.residuals(presses.means.clone());
@@ -44,21 +51,31 @@ impl Component {
             for c in 0..channels {
                 let of_sources = (&sources, &products.column(c));
                 let square = white.column(c).dot(&white.column(c));
-                let residues = evidence.residues(&restricted, *ratio, (c, square), of_sources);
-                let mut residues: Vec<(f64, f64)> =
-                    residues.map(|found| (ratio * found.square, -0.5 * found.log_determinant)).collect();
+                let residues_of_sources = evidence.residues(&restricted, *ratio, (c, square), of_sources);
+                let (mut residues, mut places) = (Vec::new(), Vec::new());
+                for found in residues_of_sources {
+                    residues.push((ratio * found.square, -0.5 * found.log_determinant));
+                    places.extend(found.place());
+                }
                 let least = residues.iter().map(|(square, _)| *square).fold(f64::INFINITY, f64::min);
                 let most = residues.iter().map(|(_, log)| *log).fold(f64::NEG_INFINITY, f64::max);
                 residues.iter_mut().for_each(|(_, log)| *log = (*log - most).exp());
                 // Readings in units of their standard deviation, so that flat priors of coefficients compare.
-                let scale = 0.5 * freedom * (ratio.ln() + units[c].ln());
+                let scale = evaluated + 0.5 * freedom * (ratio.ln() + units[c].ln());
                 for (k, noise) in noises.iter().enumerate() {
                     let density = ResidueDensity::new(noise.scales[c], freedom);
                     log_densities[[c, k, r]] = scale + most + density.log_mean_of(&residues, least);
                 }
+                let best = |k: &usize| log_densities[[c, *k, r]];
+                let Some(k) = (0..noises.len()).max_by(|a, b| best(a).total_cmp(&best(b))) else { continue };
+                let density = ResidueDensity::new(noises[k].scales[c], freedom);
+                for (place, (square, weight)) in places.into_iter().zip(&residues) {
+                    let log = scale + most + weight.ln() + density.log_of(*square);
+                    of_places[[c, place]] = log.max(of_places[[c, place]]);
+                }
             }
         }
-        Some(Self { prior, ratios, log_densities })
+        Some(Self { prior, ratios, log_densities, of_places })
     }
 
     /// ln p(readings of channel c | noise prior k), up to a constant.
@@ -75,6 +92,23 @@ impl Component {
     /// ln p(readings), up to a constant.
     pub fn log_evidence(&self) -> f64 {
         log_sum_exp(self.by_noise().into_iter())
+    }
+
+    /// Places of the sources of some channel with more than a ten-thousandth of the largest density, where one
+    /// place has more than a fifth of a channel's probability; `None` where the places are dense enough.
+    pub fn coarse_places(&self) -> Option<Vec<usize>> {
+        const LEAST: f64 = 1e-4;
+        const MOST: f64 = 0.2;
+        let mut is_coarse = false;
+        let mut probable = vec![false; self.of_places.ncols()];
+        for logs in self.of_places.outer_iter() {
+            let best = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let relative = || logs.iter().map(|log| (log - best).exp());
+            is_coarse |= relative().sum::<f64>() < MOST.recip();
+            relative().zip(&mut probable).for_each(|(density, found)| *found |= density >= LEAST);
+        }
+        let places = || (0..probable.len()).filter(|place| probable[*place]).collect();
+        (is_coarse && !probable.is_empty()).then(places)
     }
 
     /// First and last index of the ratios that have a share of the probability of some channel.

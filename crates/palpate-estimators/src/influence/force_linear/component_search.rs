@@ -5,6 +5,7 @@ use super::component::Component;
 use super::evidence::ALL_DECADES;
 use super::noise_prior::NoisePrior;
 use super::prior::{Prior, Source};
+use super::source_grid::SourceGrid;
 use crate::influence::calibration::CalibrationRows;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::regression::Kernel;
@@ -24,8 +25,7 @@ const RADII: [f64; 4] = [0.0, 0.01, 0.02, 0.035];
 pub(super) struct ComponentSearch<'a> {
     pub presses: &'a CalibrationRows,
     pub noises: &'a [NoisePrior],
-    /// Candidate positions of sources.
-    pub sensors_m: &'a [Vec<f64>],
+    pub sources: &'a SourceGrid,
     pub watch: Watch<'a>,
 }
 
@@ -83,13 +83,17 @@ impl ComponentSearch<'_> {
     }
 
     fn component(&self, prior: Prior) -> Result<Option<Component>, Cancelled> {
-        self.of_ratios(prior, decades(*ALL_DECADES.start(), *ALL_DECADES.end()))
+        self.of_ratios(prior, self.sources, decades(*ALL_DECADES.start(), *ALL_DECADES.end()))
     }
 
-    fn of_ratios(&self, prior: Prior, ratios: Vec<f64>) -> Result<Option<Component>, Cancelled> {
+    fn of_ratios(
+        &self,
+        prior: Prior,
+        grid: &SourceGrid,
+        ratios: Vec<f64>,
+    ) -> Result<Option<Component>, Cancelled> {
         self.watch.round()?;
-        let sensors_m = if prior.source.is_some() { self.sensors_m } else { &[] };
-        let found = Component::new(self.presses, prior, self.noises, sensors_m, ratios);
+        let found = Component::new(self.presses, prior, self.noises, grid, ratios);
         Ok(found.filter(|component| component.log_evidence().is_finite()))
     }
 
@@ -125,7 +129,7 @@ impl ComponentSearch<'_> {
                     }
                     let is_within = |length_m: &f64| range_m.contains(length_m);
                     let component = match prior.lengths_m.iter().all(is_within) {
-                        true => self.of_ratios(prior, ratios.clone())?,
+                        true => self.of_ratios(prior, self.sources, ratios.clone())?,
                         false => None,
                     };
                     if let Some(component) = &component {
@@ -144,17 +148,19 @@ impl ComponentSearch<'_> {
         Ok(found.into_iter().map(|(_, component)| component).collect())
     }
 
-    /// The component at twice as many ratios, where few are probable.
+    /// The component with twice as many ratios and four times as many places, where few are probable.
     fn refined(&self, component: Component) -> Result<Option<Component>, Cancelled> {
         const FEW: usize = 4;
         let (low, high) = component.probable_ratios(1e-3);
-        if high - low >= FEW {
+        let divided = component.coarse_places().map(|places| self.sources.divided(&places));
+        let is_fine = high - low >= FEW;
+        if is_fine && divided.is_none() {
             return Ok(Some(component));
         }
         let log = |r: usize| 2 * component.ratios[r].log10().round() as i32;
-        let halves = log(low) - 1..=log(high) + 1;
-        let ratios = halves.map(|half| 10f64.powf(0.5 * f64::from(half))).collect();
-        self.of_ratios(component.prior, ratios)
+        let halves = (log(low) - 1..=log(high) + 1).map(|half| 10f64.powf(0.5 * f64::from(half)));
+        let ratios = if is_fine { component.ratios.clone() } else { halves.collect() };
+        self.of_ratios(component.prior, divided.as_ref().unwrap_or(self.sources), ratios)
     }
 }
 

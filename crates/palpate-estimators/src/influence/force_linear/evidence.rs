@@ -366,6 +366,13 @@ pub(super) struct Residue {
     source: Option<SourceFit>,
 }
 
+impl Residue {
+    /// Index of the source's place.
+    pub fn place(&self) -> Option<usize> {
+        self.source.map(|source| source.place)
+    }
+}
+
 #[derive(Clone)]
 pub(super) struct WhiteSources {
     /// v, one column per position.

@@ -15,6 +15,7 @@ use super::place_noise_search::PlaceNoiseSearch;
 use super::posterior::{Conditions, Functions, of_equal_ratio, offsets, readings};
 use super::prior::{Prior, Source};
 use super::shared_errors::loadings;
+use super::source_grid::SourceGrid;
 use crate::fit::FitTask;
 use crate::influence::calibration::{Averaging, CalibrationRows, compare};
 use crate::influence::config::Structure;
@@ -51,8 +52,7 @@ pub(super) struct Learnt {
     /// Of the most probable smooth functions.
     lengths_m: Vec<f64>,
     average: Average,
-    /// Candidate positions of sources.
-    everywhere_m: Vec<Vec<f64>>,
+    sources: SourceGrid,
     /// Variance factor of the process.
     widening: f64,
     pub set_aside: Vec<usize>,
@@ -103,8 +103,7 @@ impl Learnt {
     fn average(&mut self, watch: Watch) -> Result<(), MeasuredError> {
         let searched = self.pressed.thinned(MOST_SEARCHED);
         let noises = NoisePrior::candidates(&searched);
-        let search =
-            ComponentSearch { presses: &searched, noises: &noises, sensors_m: &self.everywhere_m, watch };
+        let search = ComponentSearch { presses: &searched, noises: &noises, sources: &self.sources, watch };
         self.average = Average::new(&search.found(&self.prior, &self.lengths_m)?, &noises);
         Ok(())
     }
@@ -206,7 +205,7 @@ impl Learnt {
             sensors_m,
             lengths_m,
             average: Average::default(),
-            everywhere_m: everywhere(extent),
+            sources: SourceGrid::new(extent),
             widening,
             set_aside,
         }))
@@ -218,7 +217,7 @@ impl Learnt {
 
     /// Offsets, and influences per newton of φ.
     pub fn functions(&self, places_m: &[Vec<f64>], watch: Watch) -> Result<Vec<Functions>, MeasuredError> {
-        let mut functions = self.average.functions(&self.presses, &self.everywhere_m, places_m, watch)?;
+        let mut functions = self.average.functions(&self.presses, &self.sources.places_m, places_m, watch)?;
         let per_newton = 1.0 / self.prior.force_scale_n;
         let widening = self.widening * dependence(&self.prior, &self.presses);
         if let Some(drift) = &self.drift {
@@ -566,7 +565,7 @@ impl Search<'_> {
         const SHARES: [f64; 4] = [0.0, 1e-4, 1e-2, 1.0];
         const LENGTHS: [f64; 4] = [0.1, 0.2, 0.4, 0.8];
         const ONE_OF: usize = 5;
-        let sensors_m = everywhere(self.extent);
+        let sensors_m = SourceGrid::new(self.extent).places_m;
         // With fewer, nearly each press or position is a coefficient, and residuals do not determine the
         // variance.
         let polynomials = Prior { source: Some(Source::Strain), ..smooth.clone() }.polynomials();
@@ -652,23 +651,5 @@ impl Search<'_> {
             }
         }
         Ok((best, prior))
-    }
-}
-
-fn everywhere(extent: Extent) -> Vec<Vec<f64>> {
-    /// Count along a line; below, along a plane's longer side.
-    const ALONG: usize = 600;
-    const OF_PLANE: usize = 30;
-    let middles =
-        |size_m: f64, count: usize| (0..count).map(move |i| size_m * (i as f64 + 0.5) / count as f64);
-    let length_m = extent.length_m();
-    match extent.width_m() {
-        None => middles(length_m, ALONG).map(|x_m| vec![x_m]).collect(),
-        Some(width_m) => {
-            let longer_m = length_m.max(width_m);
-            let count = |size_m: f64| ((OF_PLANE as f64 * size_m / longer_m).ceil() as usize).max(2);
-            let across = |x_m: f64| middles(width_m, count(width_m)).map(move |y_m| vec![x_m, y_m]);
-            middles(length_m, count(length_m)).flat_map(across).collect()
-        }
     }
 }

@@ -28,6 +28,7 @@ mod saturation_fit;
 mod scan;
 mod seen;
 mod shared_errors;
+mod source_grid;
 mod systematic_sample;
 
 pub use drift::DriftCourse;

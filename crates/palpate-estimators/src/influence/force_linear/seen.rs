@@ -58,11 +58,6 @@ impl ForceLinearLocator {
         Inversion::new(self.seen(relative)).estimate(self.told_force(), limits)
     }
 
-    /// Estimate with posterior intervals, also near the ends.
-    pub(super) fn posterior(&self, reading: &[f64]) -> Estimate {
-        self.estimate(&self.relative(reading))
-    }
-
     /// Contact by summation over the grid.
     #[cfg(test)]
     pub fn summed_everywhere(&self, reading: &[f64], per_node: usize) -> palpate_core::ContactEstimate {
