@@ -20,14 +20,15 @@ pub(super) struct NoisePrior {
 }
 
 impl NoisePrior {
-    /// Equal noise or equal signal-to-noise ratios, from a tenth to 10⁻⁵ of the signal.
+    /// Equal noise or equal signal-to-noise ratios, from a thousandth to a tenth of the signal.
     pub fn candidates(presses: &CalibrationRows) -> Vec<Self> {
-        const DECADES: std::ops::RangeInclusive<i32> = -5..=-1;
+        /// Powers of ten of the variance.
+        const DECADES: std::ops::RangeInclusive<i32> = -6..=-2;
         let signals = signal_variances(presses);
         let common = mean(signals.iter().map(|signal| signal.ln())).exp();
         let units = [signals.clone(), vec![common; signals.len()]];
         let scaled = |unit: &Vec<f64>, decade: i32| Self {
-            scales: unit.iter().map(|variance| variance * 10f64.powi(2 * decade)).collect(),
+            scales: unit.iter().map(|variance| variance * 10f64.powi(decade)).collect(),
         };
         units.iter().flat_map(|unit| DECADES.map(move |decade| scaled(unit, decade))).collect()
     }

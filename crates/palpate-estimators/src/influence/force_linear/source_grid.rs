@@ -61,7 +61,7 @@ mod tests {
 
     #[test]
     fn parts_of_all_cells_are_a_finer_grid_of_the_surface() {
-        for extent in [Extent::Line { length_m: 0.3 }, Extent::Plane { length_m: 0.3, width_m: 0.2 }] {
+        for extent in [Extent::line(0.3).unwrap(), Extent::plane(0.3, 0.2).unwrap()] {
             let grid = SourceGrid::new(extent);
             let parts = grid.divided(&(0..grid.places_m.len()).collect::<Vec<_>>());
             assert_eq!(parts.places_m.len() as f64, parts.cells);

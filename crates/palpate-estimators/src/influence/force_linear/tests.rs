@@ -207,13 +207,14 @@ impl Bench {
         let functions: Vec<Functions> = (0..self.offsets.len())
             .map(|c| Functions {
                 offset: self.offsets[c],
+                noise_variance: 1.0,
                 values: readings.iter().map(|reading| reading[c]).collect(),
                 offset_variance: 0.0,
                 variances: vec![0.0; readings.len()],
                 covariances: vec![0.0; readings.len()],
             })
             .collect();
-        stored.functions = Tables::new(&functions, vec![1.0; functions.len()]);
+        stored.functions = Tables::new(&functions);
         stored.noise_freedom = 1e6;
         stored.into_locator()
     }
@@ -668,7 +669,8 @@ const GAUGE_FIT: evidence::ChannelFit =
 /// Functions of the first gauge along a strip, under a smooth prior.
 fn functions_of(presses: &CalibrationRows, prior: &Prior) -> Functions {
     let places_m: Vec<Vec<f64>> = (0..50).map(|i| vec![STRIP_M * f64::from(i) / 49.0]).collect();
-    posterior::functions(prior, presses, &[(0, &GAUGE_FIT)], &[], &places_m, Watch::NONE).unwrap().remove(0)
+    let conditions = posterior::Conditions::of_fits(prior, &[GAUGE_FIT], &[0]);
+    posterior::functions(&conditions, presses, &[], &places_m, Watch::NONE).unwrap().remove(0)
 }
 
 #[test]

@@ -60,6 +60,8 @@ fn certain(locator: &ForceLinearLocator) -> ForceLinearLikelihood {
 const LINE: [usize; 2] = [40, 1];
 const PLANE: [usize; 2] = [10, 10];
 
+/// The readings of one calibration share its error: the experiment `moving-contacts-without-model` has the
+/// coverage of many.
 #[test]
 fn a_track_on_a_line_without_a_model_is_several_times_closer_than_its_readings() {
     let rig = rig();

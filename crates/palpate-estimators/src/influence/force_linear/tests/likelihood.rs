@@ -61,11 +61,14 @@ fn calibration_variance_is_less_than_that_of_one_reading() {
     };
     assert!(one.position_m2[0] > 0.0 && one.position_m2[0] < variance_m2(&likelihood), "{one:?}");
     assert_eq!(one.position_m2[1..], [0.0; 2]);
-    // Known functions leave the overdispersion.
-    let known = bench.with_known_functions(&locator);
-    let likelihood = ForceLinearLikelihood::new(&known).unwrap();
-    let [none, _] = likelihood.calibration_variance(&[contact]);
-    let share = 1.0 - known.stored.channels_as_one.recip();
-    let all_m2 = variance_m2(&likelihood);
-    assert!((none.position_m2[0] - share * all_m2).abs() < 1e-9 * all_m2, "{none:?}");
+    // Known functions leave the overdispersion, if any.
+    for overdispersion in [1.0, 1.5] {
+        let mut known = Stored::from(bench.with_known_functions(&locator));
+        known.channels_as_one = overdispersion;
+        let likelihood = ForceLinearLikelihood::new(&known.into_locator()).unwrap();
+        let [none, _] = likelihood.calibration_variance(&[contact]);
+        let share = 1.0 - overdispersion.recip();
+        let all_m2 = variance_m2(&likelihood);
+        assert!((none.position_m2[0] - share * all_m2).abs() < 1e-9 * all_m2, "{none:?}");
+    }
 }

@@ -44,10 +44,15 @@ const LEAST_PERCENT: f64 = 86.5;
 fn noise_by_place_is_found_and_intervals_follow_it() {
     let cases: [(&str, NoiseAt, bool); 2] = [("even", |_| 1.0, false), ("half", half, true)];
     for (name, noise, differs) in cases {
-        let (ratio, covered) = fitted(Bench::strip(0, 60, 15), 0.5 * STRIP_M, noise);
-        assert_eq!(ratio.is_some(), differs, "{name}: {ratio:?}");
-        assert!(ratio.is_none_or(|ratio| (2.0..6.0).contains(&ratio)), "{name}: {ratio:?}");
+        // Touches of one strip share its calibration errors.
+        let strips = (0..3).map(|seed| fitted(Bench::strip(seed, 60, 15), 0.5 * STRIP_M, noise));
+        let strips: Vec<_> = strips.collect();
+        for (ratio, _) in &strips {
+            assert_eq!(ratio.is_some(), differs, "{name}: {ratio:?}");
+            assert!(ratio.is_none_or(|ratio| (2.0..6.0).contains(&ratio)), "{name}: {ratio:?}");
+        }
         // Without the noise by place, 51 % of the noisy half are covered.
+        let covered = [0, 1].map(|half| mean(strips.iter().map(|(_, covered)| covered[half])));
         assert!(covered.iter().all(|covered| *covered >= LEAST_PERCENT), "{name}: {covered:?}");
     }
 }
