@@ -66,8 +66,8 @@ impl ComponentSearch<'_> {
             load_radius,
             ..prior.clone()
         };
-        let polynomials = family(Source::Strain, 0.0).polynomials();
-        if self.presses.positions_m().len() < polynomials + 2 {
+        // With fewer, nearly each position is a coefficient, and residuals do not determine the noise.
+        if self.presses.positions_m().len() < 2 * family(Source::Strain, 0.0).polynomials() {
             return Ok(Vec::new());
         }
         let radii = if matches!(extent, Extent::Line { .. }) { &RADII[..] } else { &RADII[..1] };

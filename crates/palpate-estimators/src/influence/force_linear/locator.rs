@@ -628,7 +628,8 @@ impl ForceLinearLocator {
         self.tells_untouched
     }
 
-    /// Returns false where uncertain offsets alone hide such contacts at over a quarter of the nodes.
+    /// Returns false where uncertain offsets alone hide such contacts at over a quarter of the nodes, or with a
+    /// noise that no repeats measure.
     fn offsets_are_told(&self) -> bool {
         const SHARE: f64 = 0.5;
         const HIDDEN: usize = 4;
@@ -641,7 +642,8 @@ impl ForceLinearLocator {
             let hidden = (0..self.places()).filter(|place| square(*place) <= self.detection_bound).count();
             HIDDEN * hidden <= self.places()
         };
-        is_told(&|c| self.stored.functions.offset_variances[c]) || !is_told(&|_| 0.0)
+        let noise_is_measured = self.stored.noise_freedom > LEAST_FREEDOM;
+        is_told(&|c| self.stored.functions.offset_variances[c]) || noise_is_measured && !is_told(&|_| 0.0)
     }
 
     fn bound_noise(&mut self) {
