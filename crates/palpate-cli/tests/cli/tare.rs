@@ -278,7 +278,7 @@ fn held_out_readings_are_evaluated_without_the_drift_of_the_recording() {
     assert!(refused.contains("--tare auto subtracts the drift"), "{refused}");
     // `auto` judges likewise.
     file("auto.toml", &RIG.replace("\"influence\"", "\"auto\"\nonly = [\"influence\", \"neighbours\"]"));
-    let options = ["--data", "drift.csv", "--time-limit", "30 s", "-o", "auto.json"];
+    let options = ["--data", "drift.csv", "--time-limit", "2 min", "-o", "auto.json"];
     let fit = run(folder.path(), &[&["fit", "auto.toml"][..], &options].concat());
     let chosen = String::from_utf8(fit.stderr).unwrap();
     assert!(chosen.contains("it is subtracted from held-out readings\nchosen: influence force-"), "{chosen}");

@@ -9,7 +9,7 @@ use crate::features::FeatureKind;
 use crate::fit::{FitTask, check_folds};
 use crate::gaussian_process::folds_taken;
 use crate::influence::measured::{MeasuredInfluence, most_nodes, most_nuisance_nodes};
-use crate::influence::{Influence, Structure, calibration, force_linear, learning, sizes_over_a_model};
+use crate::influence::{Influence, Structure, force_linear, learning, sizes_over_a_model};
 use crate::network::LevenbergMarquardt;
 use crate::reading_check::ReadingCheck;
 use crate::recording::Recording;
@@ -245,24 +245,31 @@ impl Sizes {
     }
 
     /// Hyperparameter search, priors with a factorisation per fold, channels, residuals; refits without
-    /// outliers and with noise by position.
+    /// outliers and with noise by position; evidence of the averaged components.
     fn force_linear(&self, extent: Extent) -> FitCost {
         const EVALUATIONS: f64 = 700.0;
         const LEARNT: f64 = 2.2;
+        /// Components, with ratios of noise to signal, places of sources, and residues of a place.
+        const COMPONENTS: f64 = 60.0;
+        const RATIOS: f64 = 12.0;
+        const SOURCES: f64 = 900.0;
+        const RESIDUES: f64 = 40.0;
+        const OF_RESIDUE_S: f64 = 6e-9;
         let presses = self.presses.min(force_linear::MOST_PRESSES as f64);
         let searched = presses.min(force_linear::MOST_SEARCHED as f64);
         let nodes = force_linear::most_nodes(extent) as f64;
         let kept = presses * (1.0 - 1.0 / force_linear::FOLDS as f64);
         let factors = 2.0 * force_linear::FOLDS as f64 * kept.powi(3) / 3.0 + presses.powi(3);
         let learning = EVALUATIONS * searched.powi(3) / 3.0 / NARROW + factors / PRODUCTS;
-        // With few presses, one leave-one-out fit per position is added.
-        let fits = if presses < calibration::FEW { 1.0 + presses } else { 1.0 };
+        let evidence = searched.powi(3) / 3.0 / NARROW
+            + SOURCES * searched * searched / PRODUCTS
+            + SOURCES * RESIDUES * self.channels * OF_RESIDUE_S;
         FitCost {
             memory_bytes: NUMBER * (7.0 * presses * presses + 4.0 * nodes * self.channels)
                 + 2.0 * NUMBER * self.presses * (2.0 * self.channels + 10.0),
-            seconds: fits
-                * (self.channels * (LEARNT * learning + nodes * presses * presses / 2.0 / PRODUCTS)
-                    + LEARNT * self.presses * presses * 5e-8),
+            seconds: self.channels * (LEARNT * learning + nodes * presses * presses / 2.0 / PRODUCTS)
+                + LEARNT * self.presses * presses * 5e-8
+                + COMPONENTS * RATIOS * evidence,
         }
     }
 }

@@ -70,6 +70,10 @@ impl Average {
         Ok(mixtures.iter().map(|mixture| Functions::averaged(mixture)).collect())
     }
 
+    pub fn is_empty(&self) -> bool {
+        self.members.is_empty()
+    }
+
     pub fn has_source(&self) -> bool {
         self.members.iter().any(|member| member.prior.source.is_some())
     }

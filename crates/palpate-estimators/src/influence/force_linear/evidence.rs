@@ -123,21 +123,21 @@ pub(super) struct Evidence<'a> {
     effects: Array2<f64>,
     pub sources: Array2<f64>,
     repeats: RepeatedNoise,
-    noise_priors: Vec<FlatNoise>,
+    noise_priors: Vec<TypicalNoise>,
     /// Noise variance of each channel; empty for the most probable noise.
     densities: Vec<ResidueMixture>,
 }
 
 /// Prior of the most probable noise of few presses, which coefficients may fit exactly: 1 % of the signal within a factor
 /// of three, heavy-tailed (Student's t, one degree of freedom), above rounding.
-struct FlatNoise {
+struct TypicalNoise {
     changes: f64,
     rounding: f64,
     /// [`CalibrationRows::fewness`].
     weight: f64,
 }
 
-impl FlatNoise {
+impl TypicalNoise {
     fn of_channels(presses: &CalibrationRows) -> Vec<Self> {
         let channel = |c: usize| {
             let (_, changes) = mean_and_variance(presses.means.column(c).iter().copied());
@@ -225,7 +225,7 @@ impl<'a> Evidence<'a> {
             effects: prior.effects(presses),
             sources: prior.sources(presses, sensors_m),
             repeats: RepeatedNoise::new(presses, prior),
-            noise_priors: FlatNoise::of_channels(presses),
+            noise_priors: TypicalNoise::of_channels(presses),
             densities: Vec::new(),
         }
     }

@@ -1,7 +1,8 @@
 //! Learning of influence functions from presses.
 //!
-//! Smooth functions and point sensors at unknown positions ([`Prior::source`]) compete at held-out positions,
-//! with hyperparameters of largest log evidence.
+//! The structure, of drift, scatter and response, is that of the most probable prior: smooth functions and point
+//! sensors at unknown positions ([`Prior::source`]) compete at held-out positions. Influence functions of this
+//! structure are averaged over their hyperparameters ([`super::averaging`]).
 
 use super::averaging::Average;
 use super::component_search::ComponentSearch;
@@ -95,17 +96,19 @@ impl Learnt {
             let Some(with_noise) = learn(Some(&noise))? else { return Ok(None) };
             learnt = with_noise;
         }
-        learnt.average(watch)?;
+        learnt.average = learnt.averaged(watch)?;
+        if learnt.average.is_empty() {
+            return no_functions(structure, learnt.pressed.len());
+        }
         Ok(Some(learnt))
     }
 
     /// Averages the components of the structure.
-    fn average(&mut self, watch: Watch) -> Result<(), MeasuredError> {
+    fn averaged(&self, watch: Watch) -> Result<Average, MeasuredError> {
         let searched = self.pressed.thinned(MOST_SEARCHED);
         let noises = NoisePrior::candidates(&searched);
         let search = ComponentSearch { presses: &searched, noises: &noises, sources: &self.sources, watch };
-        self.average = Average::new(&search.found(&self.prior, &self.lengths_m)?, &noises);
-        Ok(())
+        Ok(Average::new(&search.found(&self.prior, &self.lengths_m)?, &noises))
     }
 
     fn without_outliers(
@@ -157,11 +160,7 @@ impl Learnt {
         let mut search = Search { presses: &searched, extent, structure, noise, watch, decades };
         let smooth = search.smooth()?;
         if smooth.fits.is_empty() {
-            return if structure == Structure::Auto {
-                Ok(None)
-            } else {
-                Err(MeasuredError::TooFewPresses { presses: pressed.len() })
-            };
+            return no_functions(structure, pressed.len());
         }
         if structure == Structure::Auto && !smooth.prior.has_response() {
             return Ok(None);
@@ -308,6 +307,11 @@ impl Learnt {
     }
 }
 
+/// Result where presses do not determine offsets and influence functions.
+fn no_functions(structure: Structure, presses: usize) -> Result<Option<Learnt>, MeasuredError> {
+    if structure == Structure::Auto { Ok(None) } else { Err(MeasuredError::TooFewPresses { presses }) }
+}
+
 /// Variance factor for correlated errors of the channels.
 ///
 /// Wrong positions or forces make all channels scatter with force; half of this is assumed to shift the
@@ -394,10 +398,10 @@ impl Found {
             watch.round()?;
             let conditions = Conditions::of_fits(&self.prior, &self.fits, &channels);
             let found = readings(&conditions, kept, &self.sensors_m, &others)?;
-            for (c, (readings, noise_variance)) in channels.into_iter().zip(found) {
+            for (c, readings) in channels.into_iter().zip(found) {
                 for (k, (reading, process)) in readings.into_iter().enumerate() {
                     let error = others.means[[k, c]] + others.centre[c] - reading;
-                    let noise = noise_variance * self.prior.relative_noise_of(&others, k);
+                    let noise = self.fits[c].noise_variance() * self.prior.relative_noise_of(&others, k);
                     errors.push([error * error, noise / others.count[k], process]);
                 }
             }

@@ -115,3 +115,58 @@ impl ResidueMixture {
         (most + sum.ln() + self.half_freedom * ratio.ln(), variance / sum / ratio)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Density of a squared residue by integration over ln σ².
+    fn integrated(square: f64, freedom: f64, scale: f64) -> f64 {
+        const STEP: f64 = 1e-3;
+        let density = |ln_variance: f64| {
+            let variance = ln_variance.exp();
+            let normal = -0.5 * (freedom * (2.0 * PI * variance).ln() + square / variance);
+            let half = 0.5 * FREEDOM;
+            let prior = half * (half * scale).ln()
+                - libm::lgamma(half)
+                - half * ln_variance
+                - half * scale / variance;
+            (normal + prior).exp()
+        };
+        STEP * (-20_000..20_000).map(|i| density(f64::from(i) * STEP)).sum::<f64>()
+    }
+
+    #[test]
+    fn the_noise_variance_is_integrated() {
+        for (square, freedom, scale) in [(0.3, 1.0, 0.1), (5.0, 7.0, 1.0), (40.0, 24.0, 0.5)] {
+            let found = ResidueDensity::new(scale, freedom).log_of(square);
+            let sum = integrated(square, freedom, scale).ln();
+            assert!((found - sum).abs() < 1e-6, "{square} {freedom} {scale}: {found} {sum}");
+        }
+    }
+
+    #[test]
+    fn means_of_densities_are_those_of_each_residue() {
+        for freedom in [3.0, 4.0, 25.0] {
+            let density = ResidueDensity::new(0.2, freedom);
+            let residues: Vec<(f64, f64)> =
+                (0..9).map(|i| (1.0 + f64::from(i), 0.1 + 0.3 * f64::from(i % 4))).collect();
+            let sum: f64 =
+                residues.iter().map(|(square, weight)| weight * density.log_of(*square).exp()).sum();
+            let found = density.log_mean_of(&residues, 1.0);
+            assert!((found - (sum / 9.0).ln()).abs() < 1e-12, "{freedom}: {found}");
+        }
+    }
+
+    #[test]
+    fn a_mixture_of_one_prior_is_this_prior() {
+        let (freedom, scale, square, ratio) = (6.0, 0.4, 3.0, 0.1);
+        let noise = NoiseDensity { terms: vec![(0.7, scale)] };
+        let (log, signal) = ResidueMixture::new(&noise, freedom).of_residue(square, ratio);
+        let density = ResidueDensity::new(scale, freedom);
+        let expected = 0.7 + density.log_of(ratio * square) + 0.5 * freedom * ratio.ln();
+        assert!((log - expected).abs() < 1e-12);
+        // E[σ²] = (ν₀·scale + square)/(ν₀ + ν − 2).
+        assert!((signal * ratio - (2.0 * scale + ratio * square) / freedom).abs() < 1e-12);
+    }
+}

@@ -193,19 +193,18 @@ pub(super) fn functions(
     Ok(functions)
 }
 
-/// Means and variances of the readings of `others`, without noise, and the noise variance.
+/// Means and variances of the readings of `others`, without noise.
 pub(super) fn readings(
     conditions: &Conditions,
     presses: &CalibrationRows,
     sensors_m: &[Vec<f64>],
     others: &CalibrationRows,
-) -> Result<Vec<(Vec<(f64, f64)>, f64)>, MeasuredError> {
+) -> Result<Vec<Vec<(f64, f64)>>, MeasuredError> {
     let told = Posterior::new(conditions, presses, sensors_m)?;
     let moments = told.moments(&Functional::readings(conditions.prior, others));
     let of_channel = |(channel, moments): (&Told, Vec<Moments>)| {
         let centre = presses.centre[channel.c];
-        let readings = moments.iter().map(|moments| (centre + moments.mean, moments.variance)).collect();
-        (readings, channel.signal * conditions.ratio)
+        moments.iter().map(|moments| (centre + moments.mean, moments.variance)).collect()
     };
     Ok(told.channels.iter().zip(moments).map(of_channel).collect())
 }
@@ -442,5 +441,29 @@ impl Told {
             Moments { mean: base[k] + shift, variance: variance.max(0.0), with_first: covariance }
         };
         (0..asked.variance.len()).map(moments).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mixture_has_the_variances_within_and_between_its_functions() {
+        let functions = |offset: f64, value: f64| Functions {
+            offset,
+            noise_variance: 1.0,
+            values: vec![value],
+            offset_variance: 0.1,
+            variances: vec![0.2],
+            covariances: vec![-0.05],
+        };
+        let mixture = [(0.25, functions(1.0, 4.0)), (0.75, functions(3.0, 2.0))];
+        let Functions { offset, noise_variance, values, offset_variance, variances, covariances } =
+            Functions::averaged(&mixture);
+        assert_eq!((offset, noise_variance, values[0]), (2.5, 1.0, 2.5));
+        // Variance between two values that are 2 apart: ¼·¾·2².
+        assert!((offset_variance - 0.85).abs() < 1e-12 && (variances[0] - 0.95).abs() < 1e-12);
+        assert!((covariances[0] + 0.8).abs() < 1e-12);
     }
 }

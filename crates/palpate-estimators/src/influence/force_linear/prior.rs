@@ -327,3 +327,32 @@ impl Prior {
         sources
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Mean of g over a normal distribution by the midpoint rule.
+    fn mean_over_load(source: Source, d: f64, radius: f64) -> f64 {
+        const COUNT: usize = 20_000;
+        const RANGE: f64 = 8.0;
+        let nodes = (0..COUNT).map(|i| RANGE * (2.0 * (i as f64 + 0.5) / COUNT as f64 - 1.0));
+        let (sum, all) = nodes.fold((0.0, 0.0), |(sum, all), z| {
+            let weight = (-0.5 * z * z).exp();
+            (sum + weight * source.singular_part(&[d + radius * z], 0.0), all + weight)
+        });
+        sum / all
+    }
+
+    #[test]
+    fn singular_parts_under_a_layer_are_means_over_the_load() {
+        for source in [Source::Strain, Source::Slope, Source::Deflection] {
+            for (d, radius) in [(0.0, 0.02), (0.013, 0.02), (-0.4, 0.05), (0.3, 1e-3)] {
+                let (found, mean) = (source.singular_part(&[d], radius), mean_over_load(source, d, radius));
+                assert!((found - mean).abs() < 1e-7, "{source:?} {d} {radius}: {found} {mean}");
+            }
+            let [thin, none] = [1e-9, 0.0].map(|radius| source.singular_part(&[0.1], radius));
+            assert!((thin - none).abs() < 1e-12, "{source:?}: {thin} {none}");
+        }
+    }
+}

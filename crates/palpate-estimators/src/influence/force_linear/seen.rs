@@ -230,7 +230,8 @@ impl Explain for Seen<'_> {
 
     /// Large variances of the calibration change too much between nodes.
     fn bounds_are_loose(&self) -> bool {
-        !self.locator.shared.is_empty() || self.locator.is_uncertain
+        let Stored { channels_as_one, .. } = self.locator.stored;
+        !self.locator.shared.is_empty() || channels_as_one > 1.0 || self.locator.is_uncertain
     }
 
     fn lengths(&self, [x, y]: [usize; 2], response_n: f64) -> [f64; 2] {
