@@ -4,7 +4,7 @@
 //! the component and the prior of the noise, channels are independent: each averages its own ratio ρ of noise
 //! to signal, and its own source, by evidence.
 
-use super::evidence::{Evidence, WhiteSources, amplitudes_over_noise};
+use super::evidence::{Evidence, Residue, WhiteSources, amplitudes_over_noise};
 use super::noise_prior::{NoisePrior, ResidueDensity, signal_variances};
 use super::prior::Prior;
 use super::source_grid::SourceGrid;
@@ -51,27 +51,20 @@ impl Component {
             for c in 0..channels {
                 let of_sources = (&sources, &products.column(c));
                 let square = white.column(c).dot(&white.column(c));
-                let residues_of_sources = evidence.residues(&restricted, *ratio, (c, square), of_sources);
-                let (mut residues, mut places) = (Vec::new(), Vec::new());
-                for found in residues_of_sources {
-                    residues.push((ratio * found.square, -0.5 * found.log_determinant));
-                    places.extend(found.place());
-                }
-                let least = residues.iter().map(|(square, _)| *square).fold(f64::INFINITY, f64::min);
-                let most = residues.iter().map(|(_, log)| *log).fold(f64::NEG_INFINITY, f64::max);
-                residues.iter_mut().for_each(|(_, log)| *log = (*log - most).exp());
+                let residues = evidence.residues(&restricted, *ratio, (c, square), of_sources);
+                let residues = ChannelResidues::new(residues, *ratio);
                 // Readings in units of their standard deviation, so that flat priors of coefficients compare.
                 let scale = evaluated + 0.5 * freedom * (ratio.ln() + units[c].ln());
-                for (k, noise) in noises.iter().enumerate() {
-                    let density = ResidueDensity::new(noise.scales[c], freedom);
-                    log_densities[[c, k, r]] = scale + most + density.log_mean_of(&residues, least);
+                let densities: Vec<ResidueDensity> =
+                    noises.iter().map(|noise| ResidueDensity::new(noise.scales[c], freedom)).collect();
+                let mut best = f64::NEG_INFINITY;
+                for (k, density) in densities.iter().enumerate() {
+                    log_densities[[c, k, r]] = scale + residues.log_mean(density);
+                    best = best.max(log_densities[[c, k, r]]);
                 }
-                let best = |k: &usize| log_densities[[c, *k, r]];
-                let Some(k) = (0..noises.len()).max_by(|a, b| best(a).total_cmp(&best(b))) else { continue };
-                let density = ResidueDensity::new(noises[k].scales[c], freedom);
-                for (place, (square, weight)) in places.into_iter().zip(&residues) {
-                    let log = scale + most + weight.ln() + density.log_of(*square);
-                    of_places[[c, place]] = log.max(of_places[[c, place]]);
+                let k = (0..densities.len()).rfind(|k| log_densities[[c, *k, r]] == best);
+                for (place, log) in k.into_iter().flat_map(|k| residues.of_places(densities[k])) {
+                    of_places[[c, place]] = of_places[[c, place]].max(scale + log);
                 }
             }
         }
@@ -125,6 +118,41 @@ impl Component {
             }
         }
         if found.0 > found.1 { (0, self.ratios.len() - 1) } else { found }
+    }
+}
+
+/// Residues of a channel with each source.
+struct ChannelResidues {
+    /// Squares over the noise variance, and weights relative to the largest.
+    residues: Vec<(f64, f64)>,
+    places: Vec<usize>,
+    least_square: f64,
+    /// ln of the largest weight.
+    log_most: f64,
+}
+
+impl ChannelResidues {
+    fn new(found: impl Iterator<Item = Residue>, ratio: f64) -> Self {
+        let (mut residues, mut places) = (Vec::new(), Vec::new());
+        for residue in found {
+            residues.push((ratio * residue.square, -0.5 * residue.log_determinant));
+            places.extend(residue.place());
+        }
+        let least_square = residues.iter().map(|(square, _)| *square).fold(f64::INFINITY, f64::min);
+        let log_most = residues.iter().map(|(_, log)| *log).fold(f64::NEG_INFINITY, f64::max);
+        residues.iter_mut().for_each(|(_, log)| *log = (*log - log_most).exp());
+        Self { residues, places, least_square, log_most }
+    }
+
+    /// ln of the mean density.
+    fn log_mean(&self, density: &ResidueDensity) -> f64 {
+        self.log_most + density.log_mean_of(&self.residues, self.least_square)
+    }
+
+    /// Places of sources with their log densities.
+    fn of_places(&self, density: ResidueDensity) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let log = move |(square, weight): &(f64, f64)| self.log_most + weight.ln() + density.log_of(*square);
+        self.places.iter().copied().zip(self.residues.iter().map(log))
     }
 }
 
