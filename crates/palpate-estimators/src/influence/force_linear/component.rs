@@ -39,6 +39,8 @@ impl Component {
         let units = signal_variances(presses);
         let mut log_densities = Array3::from_elem((channels, noises.len(), ratios.len()), f64::NEG_INFINITY);
         let mut of_places = Array2::from_elem((channels, sensors_m.len()), f64::NEG_INFINITY);
+        // ρ has a log-uniform prior.
+        let log_step = ratios.windows(2).map(|pair| (pair[1] / pair[0]).log10()).fold(1.0, f64::min).ln();
         // Cells that are not evaluated have no probability.
         let evaluated = if sensors_m.is_empty() { 0.0 } else { (sensors_m.len() as f64 / grid.cells).ln() };
         for (r, ratio) in ratios.iter().enumerate() {
@@ -48,15 +50,20 @@ impl Component {
             let columns = restricted.residuals(evidence.sources.clone()).0;
             let sources = WhiteSources::new(columns, &taus);
             let products = sources.products(&white.view());
+            let log_determinant = evidence.log_determinant(&restricted, *ratio);
             for c in 0..channels {
                 let of_sources = (&sources, &products.column(c));
                 let square = white.column(c).dot(&white.column(c));
-                let residues = evidence.residues(&restricted, *ratio, (c, square), of_sources);
-                let residues = ChannelResidues::new(residues, *ratio);
-                // Readings in units of their standard deviation, so that flat priors of coefficients compare.
-                let scale = evaluated + 0.5 * freedom * (ratio.ln() + units[c].ln());
                 let densities: Vec<ResidueDensity> =
                     noises.iter().map(|noise| ResidueDensity::new(noise.scales[c], freedom)).collect();
+                let Some(widest) = densities.iter().max_by(|a, b| a.scale().total_cmp(&b.scale())) else {
+                    continue;
+                };
+                let residues = evidence.residues(&restricted, *ratio, (c, square), of_sources);
+                let residues = ChannelResidues::new(residues, *ratio, widest);
+                // Readings in units of their standard deviation, so that flat priors of coefficients compare.
+                let scale = log_step + evaluated - 0.5 * log_determinant
+                    + 0.5 * freedom * (ratio.ln() + units[c].ln());
                 let mut best = f64::NEG_INFINITY;
                 for (k, density) in densities.iter().enumerate() {
                     log_densities[[c, k, r]] = scale + residues.log_mean(density);
@@ -121,37 +128,45 @@ impl Component {
     }
 }
 
-/// Residues of a channel with each source.
+/// Residues of a channel with each source, without those that are improbable under every prior of the noise.
 struct ChannelResidues {
-    /// Squares over the noise variance, and weights relative to the largest.
+    /// Squares over the noise variance, and weights.
     residues: Vec<(f64, f64)>,
     places: Vec<usize>,
     least_square: f64,
-    /// ln of the largest weight.
-    log_most: f64,
+    /// Number with the improbable ones.
+    count: f64,
 }
 
 impl ChannelResidues {
-    fn new(found: impl Iterator<Item = Residue>, ratio: f64) -> Self {
-        let (mut residues, mut places) = (Vec::new(), Vec::new());
-        for residue in found {
-            residues.push((ratio * residue.square, -0.5 * residue.log_determinant));
-            places.extend(residue.place());
+    /// Residues at the ratio ρ; `widest` has the largest noise, which distinguishes residues least.
+    fn new(found: impl Iterator<Item = Residue>, ratio: f64, widest: &ResidueDensity) -> Self {
+        /// Density over that of the least square.
+        const NEGLIGIBLE: f64 = 1e-14;
+        let mut all: Vec<Residue> = found.collect();
+        all.iter_mut().for_each(|residue| residue.square *= ratio);
+        let least = all.iter().min_by(|a, b| a.square.total_cmp(&b.square));
+        let (least_square, least_weight) = least.map_or((0.0, 1.0), |least| (least.square, least.weight));
+        let is_probable = |residue: &&Residue| {
+            residue.weight * widest.relative(residue.square, least_square) >= NEGLIGIBLE * least_weight
+        };
+        let kept = || all.iter().filter(is_probable);
+        Self {
+            residues: kept().map(|residue| (residue.square, residue.weight)).collect(),
+            places: kept().filter_map(Residue::place).collect(),
+            least_square,
+            count: all.len() as f64,
         }
-        let least_square = residues.iter().map(|(square, _)| *square).fold(f64::INFINITY, f64::min);
-        let log_most = residues.iter().map(|(_, log)| *log).fold(f64::NEG_INFINITY, f64::max);
-        residues.iter_mut().for_each(|(_, log)| *log = (*log - log_most).exp());
-        Self { residues, places, least_square, log_most }
     }
 
     /// ln of the mean density.
     fn log_mean(&self, density: &ResidueDensity) -> f64 {
-        self.log_most + density.log_mean_of(&self.residues, self.least_square)
+        density.log_sum_of(&self.residues, self.least_square) - self.count.ln()
     }
 
     /// Places of sources with their log densities.
     fn of_places(&self, density: ResidueDensity) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let log = move |(square, weight): &(f64, f64)| self.log_most + weight.ln() + density.log_of(*square);
+        let log = move |(square, weight): &(f64, f64)| weight.ln() + density.log_of(*square);
         self.places.iter().copied().zip(self.residues.iter().map(log))
     }
 }

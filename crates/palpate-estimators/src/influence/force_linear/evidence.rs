@@ -317,7 +317,7 @@ impl<'a> Evidence<'a> {
         white: &ArrayView1<f64>,
         (sources, products): (&WhiteSources, &ArrayView1<f64>),
     ) -> ChannelFit {
-        let fit = |Residue { square, log_determinant, source }: Residue| {
+        let fit = |Residue { square, log_determinant, source, .. }: Residue| {
             let (log_density, signal) = match self.densities.get(c) {
                 Some(density) => density.of_residue(square, ratio),
                 None => {
@@ -332,6 +332,11 @@ impl<'a> Evidence<'a> {
         if self.densities.is_empty() { average(ratio, &tried) } else { sampled(ratio, &tried) }
     }
 
+    /// ln of all determinants without a source's.
+    pub fn log_determinant(&self, restricted: &Restricted, ratio: f64) -> f64 {
+        restricted.log_determinant + self.repeats.freedom * ratio.ln() + self.repeats.log_determinant
+    }
+
     /// Residues of channel `c`, with |M·L⁻¹·y|² = `square`, without a source or with each source and amplitude.
     pub fn residues(
         &self,
@@ -341,15 +346,16 @@ impl<'a> Evidence<'a> {
         (sources, products): (&WhiteSources, &ArrayView1<f64>),
     ) -> impl Iterator<Item = Residue> {
         let square = square + self.repeats.squares[c] / ratio;
-        let log_determinant =
-            restricted.log_determinant + self.repeats.freedom * ratio.ln() + self.repeats.log_determinant;
-        let without = sources.is_empty().then_some(Residue { square, log_determinant, source: None });
+        let log_determinant = self.log_determinant(restricted, ratio);
+        let without =
+            sources.is_empty().then_some(Residue { square, log_determinant, weight: 1.0, source: None });
         let with = sources.amplitudes.iter().map(move |amplitude| {
-            let Amplitude { place, variance, log_determinant: of_source } = *amplitude;
+            let Amplitude { place, variance, log_determinant: of_source, weight } = *amplitude;
             let product = products[place];
             Residue {
                 square: (square - variance * product * product).max(f64::MIN_POSITIVE),
                 log_determinant: log_determinant + of_source,
+                weight,
                 source: Some(SourceFit { place, weight: 0.0, amplitude: variance * product, variance }),
             }
         });
@@ -362,7 +368,9 @@ pub(super) struct Residue {
     /// |M·L⁻¹·y|² over s².
     pub square: f64,
     /// ln of all determinants.
-    pub log_determinant: f64,
+    log_determinant: f64,
+    /// (1 + τ·vᵀ·v)^−½.
+    pub weight: f64,
     source: Option<SourceFit>,
 }
 
@@ -387,6 +395,8 @@ struct Amplitude {
     variance: f64,
     /// ln(1 + τ·vᵀ·v).
     log_determinant: f64,
+    /// (1 + τ·vᵀ·v)^−½.
+    weight: f64,
 }
 
 impl WhiteSources {
@@ -400,6 +410,7 @@ impl WhiteSources {
                 place,
                 variance: tau / (1.0 + tau * length),
                 log_determinant: (tau * length).ln_1p(),
+                weight: (1.0 + tau * length).sqrt().recip(),
             })
         });
         let amplitudes = amplitudes.collect();
@@ -419,16 +430,16 @@ impl WhiteSources {
 fn average(ratio: f64, tried: &[(f64, f64, Option<SourceFit>)]) -> ChannelFit {
     let best = tried.iter().fold(f64::NEG_INFINITY, |best, (evidence, ..)| best.max(*evidence));
     let count = tried.len() as f64;
-    let weight = |evidence: f64| (evidence - best).exp();
-    let all: f64 = tried.iter().map(|(evidence, ..)| weight(*evidence)).sum();
-    let kept = || tried.iter().filter(|(evidence, ..)| weight(*evidence) >= LEAST_SHARE);
-    let total: f64 = kept().map(|(evidence, ..)| weight(*evidence)).sum();
-    let with_weight = |(evidence, _, source): &(f64, f64, Option<SourceFit>)| {
-        source.map(|source| SourceFit { weight: weight(*evidence) / total, ..source })
+    let weights: Vec<f64> = tried.iter().map(|(evidence, ..)| (evidence - best).exp()).collect();
+    let all: f64 = weights.iter().sum();
+    let kept = || tried.iter().zip(&weights).filter(|(_, weight)| **weight >= LEAST_SHARE);
+    let total: f64 = kept().map(|(_, weight)| weight).sum();
+    let with_weight = |((.., source), weight): (&(f64, f64, Option<SourceFit>), &f64)| {
+        source.map(|source| SourceFit { weight: weight / total, ..source })
     };
     ChannelFit {
         ratio,
-        signal: kept().map(|(evidence, signal, _)| weight(*evidence) * signal).sum::<f64>() / total,
+        signal: kept().map(|((_, signal, _), weight)| weight * signal).sum::<f64>() / total,
         evidence: best + (all / count).ln(),
         sources: kept().filter_map(with_weight).collect(),
     }

@@ -46,6 +46,8 @@ pub(super) fn signal_variances(presses: &CalibrationRows) -> Vec<f64> {
 pub(super) struct ResidueDensity {
     constant: f64,
     power: f64,
+    /// Whole part of the power, and whether a half remains.
+    whole: (i32, bool),
     /// ν₀ times the scale.
     prior: f64,
 }
@@ -56,25 +58,34 @@ impl ResidueDensity {
         let power = 0.5 * (FREEDOM + freedom);
         let constant = libm::lgamma(power) - libm::lgamma(0.5 * FREEDOM) - 0.5 * freedom * PI.ln()
             + 0.5 * FREEDOM * prior.ln();
-        Self { constant, power, prior }
+        let doubled = (2.0 * power).round() as i32;
+        Self { constant, power, whole: (doubled / 2, doubled % 2 == 1), prior }
     }
 
     pub fn log_of(&self, square: f64) -> f64 {
         self.constant - self.power * (self.prior + square).ln()
     }
 
-    /// Logarithm of the mean density of residues with the squares and weights `residues`, given by the least square.
+    /// Scale of the prior, up to a factor of all priors.
+    pub fn scale(&self) -> f64 {
+        self.prior
+    }
+
+    /// Density of a residue over that of the residue `least`.
     ///
     /// The power is an integer or half of one, so that no residue needs a logarithm.
-    pub fn log_mean_of(&self, residues: &[(f64, f64)], least: f64) -> f64 {
-        let doubled = (2.0 * self.power).round() as i32;
-        let relative = |square: f64| (self.prior + least) / (self.prior + square);
-        let power = |relative: f64| {
-            let whole = relative.powi(doubled / 2);
-            if doubled % 2 == 0 { whole } else { whole * relative.sqrt() }
-        };
-        let sum: f64 = residues.iter().map(|(square, weight)| weight * power(relative(*square))).sum();
-        self.log_of(least) + (sum / residues.len() as f64).ln()
+    pub fn relative(&self, square: f64, least: f64) -> f64 {
+        let base = (self.prior + least) / (self.prior + square);
+        let (whole, has_half) = self.whole;
+        let power = base.powi(whole);
+        if has_half { power * base.sqrt() } else { power }
+    }
+
+    /// Logarithm of the summed density of residues with the squares and weights `residues`, given by the
+    /// least square.
+    pub fn log_sum_of(&self, residues: &[(f64, f64)], least: f64) -> f64 {
+        let sum: f64 = residues.iter().map(|(square, weight)| weight * self.relative(*square, least)).sum();
+        self.log_of(least) + sum.ln()
     }
 
     /// Posterior mean of the noise variance.
@@ -106,12 +117,18 @@ impl ResidueMixture {
     /// Log density of a squared residue over s², and the posterior mean of s².
     pub fn of_residue(&self, square: f64, ratio: f64) -> (f64, f64) {
         let square = ratio * square;
-        let log = |(log_weight, density): &(f64, ResidueDensity)| log_weight + density.log_of(square);
-        let most = self.terms.iter().map(log).fold(f64::NEG_INFINITY, f64::max);
-        let (sum, variance) = self.terms.iter().fold((0.0, 0.0), |(sum, variance), term| {
-            let weight = (log(term) - most).exp();
-            (sum + weight, variance + weight * term.1.noise_variance(square))
-        });
+        // Relative to the most probable term so far.
+        let (mut most, mut sum, mut variance) = (f64::NEG_INFINITY, 0.0, 0.0);
+        for (log_weight, density) in &self.terms {
+            let log = log_weight + density.log_of(square);
+            if log > most {
+                let scale = (most - log).exp();
+                (most, sum, variance) = (log, sum * scale, variance * scale);
+            }
+            let weight = (log - most).exp();
+            sum += weight;
+            variance += weight * density.noise_variance(square);
+        }
         (most + sum.ln() + self.half_freedom * ratio.ln(), variance / sum / ratio)
     }
 }
@@ -146,15 +163,15 @@ mod tests {
     }
 
     #[test]
-    fn means_of_densities_are_those_of_each_residue() {
+    fn sums_of_densities_are_those_of_each_residue() {
         for freedom in [3.0, 4.0, 25.0] {
             let density = ResidueDensity::new(0.2, freedom);
             let residues: Vec<(f64, f64)> =
                 (0..9).map(|i| (1.0 + f64::from(i), 0.1 + 0.3 * f64::from(i % 4))).collect();
             let sum: f64 =
                 residues.iter().map(|(square, weight)| weight * density.log_of(*square).exp()).sum();
-            let found = density.log_mean_of(&residues, 1.0);
-            assert!((found - (sum / 9.0).ln()).abs() < 1e-12, "{freedom}: {found}");
+            let found = density.log_sum_of(&residues, 1.0);
+            assert!((found - sum.ln()).abs() < 1e-12, "{freedom}: {found}");
         }
     }
 
