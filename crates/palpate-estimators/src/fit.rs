@@ -120,12 +120,12 @@ impl<T> SeedQueue<T> for SeedList<T> {
     }
 }
 
-pub(crate) struct Mapped<'a, U, F> {
+pub(crate) struct MappedQueue<'a, U, F> {
     pub queue: &'a mut dyn SeedQueue<U>,
     pub map: F,
 }
 
-impl<T, U, F: Fn(u64, T) -> U> SeedQueue<T> for Mapped<'_, U, F> {
+impl<T, U, F: Fn(u64, T) -> U> SeedQueue<T> for MappedQueue<'_, U, F> {
     fn next_seed(&mut self) -> Option<u64> {
         self.queue.next_seed()
     }

@@ -27,7 +27,7 @@ pub struct UntouchedDrift {
 impl UntouchedDrift {
     /// Returns a drift beyond noise.
     pub fn of_recording(recording: &Recording) -> Option<Self> {
-        let rests = recording.rests();
+        let rests = recording.untouched_groups();
         if rests.len() < FEWEST_RESTS {
             return None;
         }

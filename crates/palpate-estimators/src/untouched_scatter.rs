@@ -50,14 +50,15 @@ impl Deviations {
     const OF_LINE: usize = 2;
 
     pub fn of_rests(recording: &Recording) -> Option<Self> {
-        let rests = Self::new(recording, &recording.rests())?;
+        let rests = Self::new(recording, &recording.untouched_groups())?;
         let noise = Self::of_repeats(&recording.touched()).filter(|noise| rests.scatter_as_much_as(noise));
         Some(Self { noise: noise.map(Box::new), ..rests })
     }
 
     /// Single rows, without the residue of touches.
     pub fn of_single_rows(recording: &Recording) -> Option<Self> {
-        let rows: Vec<Vec<usize>> = recording.rests().into_iter().flatten().map(|row| vec![row]).collect();
+        let rows: Vec<Vec<usize>> =
+            recording.untouched_groups().into_iter().flatten().map(|row| vec![row]).collect();
         Self::new(recording, &rows)
     }
 

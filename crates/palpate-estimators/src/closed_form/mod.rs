@@ -6,6 +6,7 @@ mod polynomial;
 
 use serde::{Deserialize, Serialize};
 
+use crate::confidence_region::{Contacts, Force, interval_on_line_95, is_near_end};
 use crate::distributed_contact::{BoundedContact, distributed_contact_bound, distributed_contact_score};
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
 use crate::force_prior::DECADE;
@@ -15,7 +16,6 @@ use crate::setup::Setup;
 use crate::status::{
     FalseAlarmRate, LINE_PLACES, NO_CONTACT, OTHER_PLACE, StatusRule, chi_squared_bound, unknowns,
 };
-use crate::trade_off::{Contacts, Force, interval_on_line_95, is_near_end};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};

@@ -653,7 +653,7 @@ fn force_step(fit: &ContactFit<2>) -> [f64; 2] {
     [0.0, if ff > 0.0 { fit.score[1] / ff } else { 0.0 }]
 }
 
-type Tried = (PointContact, ContactFit<2>);
+type Candidate = (PointContact, ContactFit<2>);
 
 const START_SHARES: [f64; 3] = [0.1, 0.4, 0.8];
 /// Strong bending shortens the lever arms.
@@ -662,7 +662,7 @@ const MOST_STEPS: usize = 60;
 const LAST_STEP: f64 = 1e-10;
 const MOST_HALVINGS: usize = 30;
 
-fn search(likelihood: &Likelihood, stretch: Stretch) -> Tried {
+fn search(likelihood: &Likelihood, stretch: Stretch) -> Candidate {
     let reached = START_SHARES.map(|share| {
         let position_m = stretch.from_m + share * (stretch.to_m - stretch.from_m);
         let start = start(likelihood, stretch, position_m);
@@ -687,8 +687,8 @@ fn refine(
     likelihood: &Likelihood,
     stretch: Stretch,
     start: PointContact,
-    step: impl Fn(&Tried) -> [f64; 2],
-) -> Tried {
+    step: impl Fn(&Candidate) -> [f64; 2],
+) -> Candidate {
     let mut best = (start, likelihood.fit_at(start, stretch));
     for _ in 0..MOST_STEPS {
         let Some(next) = descend(likelihood, stretch, &best, step(&best)) else { break };
@@ -703,7 +703,7 @@ fn refine(
 }
 
 /// (JᵀJ)⁻¹·Jᵀr up to the end of the segment; at an end, a step of the force alone.
-fn gauss_newton_step(likelihood: &Likelihood, stretch: Stretch, (guess, fit): &Tried) -> [f64; 2] {
+fn gauss_newton_step(likelihood: &Likelihood, stretch: Stretch, (guess, fit): &Candidate) -> [f64; 2] {
     let Some(factors) = likelihood.factors(fit) else { return force_step(fit) };
     let [along_m, harder_n] = factors.solve(fit.score);
     let room_m =
@@ -718,9 +718,9 @@ fn gauss_newton_step(likelihood: &Likelihood, stretch: Stretch, (guess, fit): &T
 fn descend(
     likelihood: &Likelihood,
     stretch: Stretch,
-    (guess, fit): &Tried,
+    (guess, fit): &Candidate,
     [along_m, harder_n]: [f64; 2],
-) -> Option<Tried> {
+) -> Option<Candidate> {
     let mut share = 1.0;
     for _ in 0..MOST_HALVINGS {
         let (position_m, force_n) = (guess.position_m + share * along_m, guess.force_n + share * harder_n);

@@ -36,7 +36,9 @@ use crate::closed_form::{ClosedForm, ClosedFormFitError, ClosedFormLocator};
 use crate::detectable_force::DetectableForce;
 use crate::digit::{DigitEstimator, DigitFitError, DigitLocator, DigitShape, DigitTheory};
 use crate::evaluation::EvaluationError;
-use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, NoCheck, SeedQueue};
+use crate::fit::{
+    ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, MappedQueue, NoCheck, SeedQueue,
+};
 use crate::fit_memo::FitMemo;
 use crate::gaussian_process::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
 use crate::influence::{
@@ -160,7 +162,7 @@ macro_rules! estimators {
                 match self {
                     $(Self::$variant(estimator) => {
                         let map = |_, locator: Fitted<$method>| locator.into_locator();
-                        Ok(estimator.fit_many(task, &mut Mapped { queue, map })?)
+                        Ok(estimator.fit_many(task, &mut MappedQueue { queue, map })?)
                     })*
                     Self::Auto(_) => self.choose_estimator(asked)?.fit_many(asked, queue),
                 }
@@ -567,7 +569,7 @@ impl Locator {
     /// ```
     pub fn estimates_force(&self) -> bool {
         match &self.method {
-            Method::Influence(influence) => influence.tells_force(),
+            Method::Influence(influence) => influence.estimates_force(),
             Method::ClosedForm(_) | Method::Digit(_) => true,
             Method::Network(_) => false,
             Method::NetworkLm(networks) => networks.estimates_force(),

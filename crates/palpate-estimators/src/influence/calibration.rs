@@ -206,7 +206,7 @@ impl CalibrationRows {
     /// With one force and one pass along the surface, time and position are confounded. Different forces or
     /// untouched rows far apart identify drift, or neighbours at different times: the mean square of time
     /// steps over the variance, 2 in random order (von Neumann, Annals of Mathematical Statistics 12, 1941).
-    pub fn tells_drift(&self) -> bool {
+    pub fn identifies_drift(&self) -> bool {
         /// Standard deviation over the mean.
         const LEAST_FORCES: f64 = 0.1;
         /// Fraction of the recording between untouched rows.

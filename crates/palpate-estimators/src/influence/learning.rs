@@ -137,8 +137,8 @@ impl<'a> Learning<'a> {
         let has_one_force = is_one_force(touched.iter().map(|row| rows.force_n[*row]));
         let offset_is_open = has_one_force && touched.len() == rows.len();
         let is_reaction_alone = mean == Mean::Zero && kind == SensorKind::Reaction && offset_is_open;
-        let told = Told { noise: noise_is_told, offset: is_reaction_alone };
-        let mut hyper = most_probable(&searched, mean, surface.length_m(), told, watch)?;
+        let identifiable = Identifiability { noise: noise_is_told, offset: is_reaction_alone };
+        let mut hyper = most_probable(&searched, mean, surface.length_m(), identifiable, watch)?;
         if source == InfluenceSource::Mechanics {
             hyper = Hyperparameters { noise: hyper.noise, ..Hyperparameters::NONE };
         }
@@ -349,7 +349,7 @@ const LOWEST: [f64; 5] = [-6.0, -8.0, -7.0, -9.0, -9.0];
 const HIGHEST: [f64; 5] = [0.0, -1.0, 2.0, 0.0, 0.0];
 
 #[derive(Clone, Copy)]
-struct Told {
+struct Identifiability {
     noise: bool,
     offset: bool,
 }
@@ -359,7 +359,7 @@ fn most_probable(
     sensors: &[SensorRows],
     mean: Mean,
     length_m: f64,
-    told: Told,
+    identifiable: Identifiability,
     watch: Watch,
 ) -> Result<Hyperparameters, Cancelled> {
     let hyper = |logs: &[f64; 5]| {
@@ -386,17 +386,17 @@ fn most_probable(
         Ok(sensors.iter().map(|s| s.log_evidence(&hyper(logs))).sum::<f64>())
     };
     let mut free = vec![2];
-    if !told.offset {
+    if !identifiable.offset {
         free.push(3);
     }
     if mean == Mean::Model {
         free.extend([0, 1]);
     }
-    if !told.noise {
+    if !identifiable.noise {
         free.push(4);
     }
     let mut logs = START;
-    if told.offset {
+    if identifiable.offset {
         logs[3] = LOWEST[3];
     }
     if mean == Mean::Zero {

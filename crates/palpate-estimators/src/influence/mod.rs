@@ -247,10 +247,10 @@ impl InfluenceLocator {
     }
 
     /// True where estimates have a force.
-    pub fn tells_force(&self) -> bool {
+    pub fn estimates_force(&self) -> bool {
         match self {
             Self::Beam(_) | Self::Plane(_) | Self::ForceLinear(_) => true,
-            Self::Measured(measured) => measured.tells_force(),
+            Self::Measured(measured) => measured.estimates_force(),
         }
     }
 

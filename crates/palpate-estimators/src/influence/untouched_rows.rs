@@ -17,11 +17,11 @@ pub(super) struct UntouchedRows {
     pub scatter: Vec<f64>,
     pub freedom: f64,
     /// Empty without a drift.
-    rests: Vec<Rest>,
+    untouched: Vec<UntouchedMean>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-struct Rest {
+struct UntouchedMean {
     time: f64,
     mean: Vec<f64>,
     count: f64,
@@ -37,15 +37,15 @@ pub(super) struct RowOffset {
 impl UntouchedRows {
     pub fn of_recording(recording: &Recording) -> Option<Self> {
         let mean = recording.untouched_mean()?;
-        let rests = recording.rests();
+        let untouched = recording.untouched_groups();
         let drifts = UntouchedDrift::of_recording(recording).is_some();
         let times = recording.times_or_order();
-        let rest = |rows: &Vec<usize>| Rest {
+        let mean_of = |rows: &Vec<usize>| UntouchedMean {
             time: self::mean(rows.iter().map(|row| times[*row])),
             mean: recording.mean_reading(rows),
             count: rows.len() as f64,
         };
-        let all: Vec<Vec<usize>> = if drifts { rests.clone() } else { vec![rests.concat()] };
+        let all: Vec<Vec<usize>> = if drifts { untouched.clone() } else { vec![untouched.concat()] };
         let means: Vec<Vec<f64>> = all.iter().map(|rows| recording.mean_reading(rows)).collect();
         let scatter = |c: usize| -> f64 {
             let of_group = |(rows, mean): (&Vec<usize>, &Vec<f64>)| -> f64 {
@@ -53,25 +53,27 @@ impl UntouchedRows {
             };
             all.iter().zip(&means).map(of_group).sum()
         };
-        let count: usize = rests.iter().map(Vec::len).sum();
+        let count: usize = untouched.iter().map(Vec::len).sum();
         Some(Self {
             scatter: (0..recording.channels.len()).map(scatter).collect(),
             freedom: (count - all.len()) as f64,
             count: count as f64,
-            rests: if drifts { rests.iter().map(rest).collect() } else { Vec::new() },
+            untouched: if drifts { untouched.iter().map(mean_of).collect() } else { Vec::new() },
             mean,
         })
     }
 
     pub fn drifts(&self) -> bool {
-        !self.rests.is_empty()
+        !self.untouched.is_empty()
     }
 
     pub fn offset_at(&self, time: f64) -> RowOffset {
-        let after = self.rests.partition_point(|rest| rest.time <= time);
-        let of_rest =
-            |rest: &Rest| RowOffset { values: rest.mean.clone(), relative_variance: rest.count.recip() };
-        match (after.checked_sub(1).and_then(|i| self.rests.get(i)), self.rests.get(after)) {
+        let after = self.untouched.partition_point(|mean| mean.time <= time);
+        let of_rest = |rest: &UntouchedMean| RowOffset {
+            values: rest.mean.clone(),
+            relative_variance: rest.count.recip(),
+        };
+        match (after.checked_sub(1).and_then(|i| self.untouched.get(i)), self.untouched.get(after)) {
             (None, None) => RowOffset { values: self.mean.clone(), relative_variance: self.count.recip() },
             (Some(only), None) | (None, Some(only)) => of_rest(only),
             (Some(before), Some(after)) => {

@@ -21,7 +21,9 @@ pub use palpate_core::Activation;
 pub use prepared::PreparedNetwork;
 pub use train::{Precision, TrainingTask, train_many, train_one};
 
-use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, NoCheck, SeedQueue};
+use crate::fit::{
+    ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, MappedQueue, NoCheck, SeedQueue,
+};
 use crate::recording::{Recording, Row};
 use crate::setup::Setup;
 use crate::status::on_surface;
@@ -312,7 +314,7 @@ impl Fit for Network {
         let coded = CodedTraining::new(self, task)?;
         let map = |seed, network| Fitted::new(task.seed(seed), coded.locator(network));
         let set = InstructionSet::best();
-        Ok(train_many(set, self.precision, &coded.task(), &mut Mapped { queue, map }, task.watch)?)
+        Ok(train_many(set, self.precision, &coded.task(), &mut MappedQueue { queue, map }, task.watch)?)
     }
 }
 

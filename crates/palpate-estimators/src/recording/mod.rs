@@ -274,7 +274,7 @@ impl Recording {
     }
 
     /// Returns runs of consecutive untouched rows.
-    pub fn rests(&self) -> Vec<Vec<usize>> {
+    pub fn untouched_groups(&self) -> Vec<Vec<usize>> {
         let indices: Vec<usize> = (0..self.rows.len()).collect();
         let touches = |row: &usize| self.rows[*row].touches();
         let runs = indices.chunk_by(|a, b| touches(a) == touches(b));

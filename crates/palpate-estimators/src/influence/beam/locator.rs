@@ -6,7 +6,7 @@
 use super::coarse::Profile;
 use super::gauss_newton::Minimum;
 use super::multi_contact::locate_several;
-use super::posterior::{Read, conclude};
+use super::posterior::{WhitenedReading, conclude};
 use super::search::{ForEight, NEGLIGIBLE, Scratch, Search};
 use super::table::InfluenceTable;
 use crate::fit::{Locate, LocatorFault, NoCheck};
@@ -236,7 +236,7 @@ fn locate_eight<V: EightLanes>(
     for i in 0..8 {
         if floors[i] > minima[i].misfit + NEGLIGIBLE {
             let whitened = &whitened[i * groups..][..groups];
-            let read = Read { whitened, square: squares[i] };
+            let read = WhitenedReading { whitened, square: squares[i] };
             conclude(search, read, &minima[i..=i], &profiles[i], &mut estimates[i]);
         } else {
             hard |= 1 << i;
@@ -273,7 +273,7 @@ fn locate_into<V: EightLanes>(
 ) {
     let square = search.whiten::<V>(reading, scratch.whitened.room(search.groups()));
     let (minima, count) = search.minima::<V>(square, scratch);
-    let read = Read { whitened: scratch.whitened.groups(search.groups()), square };
+    let read = WhitenedReading { whitened: scratch.whitened.groups(search.groups()), square };
     conclude(search, read, &minima[..count], &scratch.profile, estimate);
 }
 

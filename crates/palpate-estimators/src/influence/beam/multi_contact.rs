@@ -28,7 +28,7 @@ pub(super) fn locate_several(
     let mut least = misfit + search.rule.contact_cost();
     let mut best = None;
     for count in 2..=most {
-        let Some(together) = explain(search, whitened, count) else { break };
+        let Some(together) = fit_contacts(search, whitened, count) else { break };
         let (cost, misfit) = (together.misfit + count as f64 * one_more, together.misfit);
         if cost < least {
             (least, best) = (cost, Some(together));
@@ -58,7 +58,7 @@ struct MultiContact {
 }
 
 /// Fits `count` contacts; `None` where they are unidentifiable.
-fn explain(search: &Search, whitened: &[f64], count: usize) -> Option<MultiContact> {
+fn fit_contacts(search: &Search, whitened: &[f64], count: usize) -> Option<MultiContact> {
     if 2 * count > search.live.len() {
         return None;
     }

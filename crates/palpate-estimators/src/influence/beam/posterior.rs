@@ -3,9 +3,9 @@
 use super::coarse::{COARSE, MOST_MINIMA, Profile};
 use super::gauss_newton::Minimum;
 use super::search::Search;
+use crate::confidence_region::{CALIBRATED, ConfidenceRegion, Contacts, Force, is_near_end};
 use crate::influence::config::ForceBelief;
 use crate::status::OTHER_PLACE;
-use crate::trade_off::{CALIBRATED, Contacts, Force, NotExcluded, is_near_end};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_numerics::{bisect, normal_cdf, normal_interval_95};
@@ -14,7 +14,7 @@ use palpate_numerics::{bisect, normal_cdf, normal_interval_95};
 const MOST_SPACINGS: f64 = 1.5;
 
 #[derive(Clone, Copy)]
-pub(super) struct Read<'a> {
+pub(super) struct WhitenedReading<'a> {
     pub whitened: &'a [[f64; 8]],
     pub square: f64,
 }
@@ -22,7 +22,7 @@ pub(super) struct Read<'a> {
 #[inline(always)]
 pub(super) fn conclude(
     search: &Search,
-    read: Read,
+    read: WhitenedReading,
     minima: &[Minimum],
     profile: &Profile,
     estimate: &mut Estimate,
@@ -65,7 +65,7 @@ fn is_too_hard(search: &Search, minimum: &Minimum) -> bool {
 #[cold]
 fn write_uncertain(
     search: &Search,
-    read: Read,
+    read: WhitenedReading,
     minima: &[Minimum],
     profile: &Profile,
     estimate: &mut Estimate,
@@ -91,7 +91,7 @@ fn write_uncertain(
     }
 }
 
-fn not_excluded(search: &Search, whitened: &[[f64; 8]], minima: &[Minimum]) -> Option<NotExcluded> {
+fn not_excluded(search: &Search, whitened: &[[f64; 8]], minima: &[Minimum]) -> Option<ConfidenceRegion> {
     let (table, gauss_newton) = (&search.table, &search.gauss_newton);
     let channels = |x_m: f64, force_n: f64, channels: &mut Vec<[f64; 2]>| {
         let cell = table.cell(x_m);

@@ -158,7 +158,7 @@ fn gather(reading: &[f64], channels: &[usize]) -> [f64; 8] {
 /// Reusable memory for locating readings; up to sixteen channels need no allocation.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
-    pub(super) whitened: Whitened,
+    pub(super) whitened: ChannelGroups,
     pub(super) profile: Profile,
     pub(super) eight: ForEight,
 }
@@ -179,12 +179,12 @@ impl ForEight {
 
 /// d, in zero-padded groups of eight channels.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Whitened {
+pub(super) struct ChannelGroups {
     near: [[f64; 8]; 2],
     far: Vec<[f64; 8]>,
 }
 
-impl Whitened {
+impl ChannelGroups {
     #[inline(always)]
     pub fn room(&mut self, groups: usize) -> &mut [[f64; 8]] {
         if groups <= 2 {

@@ -7,9 +7,9 @@
 //! interval that reaches such an end is the whole surface.
 
 use super::locator::{ForceLinearLocator, Stored};
+use crate::confidence_region::{CALIBRATED, ConfidenceRegion, Contacts, Force};
 use crate::influence::grid::Axis;
 use crate::status::OTHER_PLACE;
-use crate::trade_off::{CALIBRATED, Contacts, Force, NotExcluded};
 use palpate_core::{ContactEstimate, Estimate};
 use palpate_numerics::{NORMAL_95, NORMAL_99, extend_to, hull, normal_interval_95};
 use std::cell::RefCell;
@@ -72,7 +72,7 @@ impl ForceLinearLocator {
         }
     }
 
-    fn not_excluded(&self, axis: Axis, relative: &[f64], minima_m: &[f64]) -> Option<NotExcluded> {
+    fn not_excluded(&self, axis: Axis, relative: &[f64], minima_m: &[f64]) -> Option<ConfidenceRegion> {
         let seen = RefCell::new(self.seen(relative));
         let channels = |along_m: f64, response_n: f64, channels: &mut Vec<[f64; 2]>| {
             seen.borrow_mut().whiten([along_m / axis.step, 0.0, response_n], channels)
@@ -100,7 +100,7 @@ impl ForceLinearLocator {
         self.stored.prior.force_of_response(self.force_prior.ends_n().1, 0.0).0
     }
 
-    fn on_surface(&self, axis: Axis, found: &NotExcluded) -> ((f64, f64), Option<(f64, f64)>) {
+    fn on_surface(&self, axis: Axis, found: &ConfidenceRegion) -> ((f64, f64), Option<(f64, f64)>) {
         let Stored { prior, .. } = &self.stored;
         let (_, hardest_n) = self.force_prior.ends_n();
         /// Fraction of the surface's length.

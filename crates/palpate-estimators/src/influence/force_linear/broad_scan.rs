@@ -25,7 +25,7 @@ pub(super) struct ChannelAtPlace {
     pub f: f64,
     pub noise: f64,
     /// ω.
-    pub open: f64,
+    pub offset_variance: f64,
     pub beta: f64,
     pub v: f64,
     pub least: f64,
@@ -35,7 +35,7 @@ impl ChannelAtPlace {
     pub fn scaled(self, noise: f64, calibration: f64) -> Self {
         Self {
             noise: noise * self.noise,
-            open: calibration * self.open,
+            offset_variance: calibration * self.offset_variance,
             beta: calibration * self.beta,
             v: calibration * self.v,
             ..self
@@ -47,7 +47,7 @@ impl ChannelAtPlace {
 struct Terms {
     f: Lanes,
     noise: Lanes,
-    open: Lanes,
+    offset_variance: Lanes,
     twice_beta: Lanes,
     v: Lanes,
 }
@@ -79,7 +79,7 @@ impl BroadScan {
         const NO_PLACE: Terms = Terms {
             f: [0.0; LANES],
             noise: [1.0; LANES],
-            open: [0.0; LANES],
+            offset_variance: [0.0; LANES],
             twice_beta: [0.0; LANES],
             v: [0.0; LANES],
         };
@@ -89,9 +89,9 @@ impl BroadScan {
         for place in 0..places {
             let (block, lane) = (place / LANES, place % LANES);
             for c in 0..channels {
-                let ChannelAtPlace { f, noise, open, beta, v, least } = channel(place, c);
+                let ChannelAtPlace { f, noise, offset_variance, beta, v, least } = channel(place, c);
                 let terms = &mut terms[block * channels + c];
-                (terms.f[lane], terms.noise[lane], terms.open[lane]) = (f, noise, open);
+                (terms.f[lane], terms.noise[lane], terms.offset_variance[lane]) = (f, noise, offset_variance);
                 (terms.twice_beta[lane], terms.v[lane]) = (2.0 * beta, v);
                 constants[block][lane] += least.ln();
             }
@@ -104,9 +104,11 @@ impl BroadScan {
         let zero = V::splat(0.0);
         let mut sums = Sums { dd: zero, fd: zero, ff: V::splat(f64::MIN_POSITIVE) };
         for (terms, d) in self.terms[block * self.channels..(block + 1) * self.channels].iter().zip(reading) {
-            let (f, noise, open) = (V::load(&terms.f), V::load(&terms.noise), V::load(&terms.open));
+            let (f, noise, offset_variance) =
+                (V::load(&terms.f), V::load(&terms.noise), V::load(&terms.offset_variance));
             let (twice_beta, v) = (V::load(&terms.twice_beta), V::load(&terms.v));
-            let variance = noise + response.mul_add(response.mul_add(v, twice_beta), open).max(zero);
+            let variance =
+                noise + response.mul_add(response.mul_add(v, twice_beta), offset_variance).max(zero);
             let (weight, d) = (V::splat(1.0) / variance, V::splat(*d));
             let (weighted_d, weighted_f) = (weight * d, weight * f);
             sums.dd = weighted_d.mul_add(d, sums.dd);
@@ -123,7 +125,7 @@ impl CellBlocks for BroadScan {
     }
 
     #[inline(always)]
-    fn look<V: EightLanes>(&self, block: usize, reading: &[f64]) -> [V; 3] {
+    fn bounds<V: EightLanes>(&self, block: usize, reading: &[f64]) -> [V; 3] {
         let (_, greatest_n) = self.prior.ends_n();
         let (zero, greatest) = (V::splat(0.0), V::splat(greatest_n));
         let by_noise = self.sums(block, reading, zero).response(greatest);

@@ -30,7 +30,7 @@ pub(super) fn amplitudes_over_noise() -> impl Iterator<Item = f64> {
 const LEAST_SHARE: f64 = 1e-3;
 
 /// Covariance with offset and polynomials projected out.
-pub(super) struct Restricted {
+pub(super) struct RestrictedCovariance {
     pub cholesky: Cholesky,
     /// L⁻¹·H, n × q.
     effects: Array2<f64>,
@@ -40,7 +40,7 @@ pub(super) struct Restricted {
     pub log_determinant: f64,
 }
 
-impl Restricted {
+impl RestrictedCovariance {
     /// # Errors
     /// [`NotPositiveDefinite`] where offset and polynomials are unidentifiable.
     pub fn new(covariance: Array2<f64>, effects: &Array2<f64>) -> Result<Self, NotPositiveDefinite> {
@@ -77,7 +77,7 @@ impl Restricted {
     }
 
     /// R⁻ᵀ·(h − Hᵀ·A⁻¹·k), with `white` = L⁻¹·k.
-    pub fn open_effects(&self, h: &Array2<f64>, white: &Array2<f64>) -> Array2<f64> {
+    pub fn unexplained_effects(&self, h: &Array2<f64>, white: &Array2<f64>) -> Array2<f64> {
         self.gram.solve_lower_matrix(h - &self.effects.t().dot(white))
     }
 }
@@ -240,8 +240,8 @@ impl<'a> Evidence<'a> {
         self.presses.len() as f64 + self.repeats.freedom - self.effects.ncols() as f64
     }
 
-    pub fn restricted(&self, ratio: f64) -> Result<Restricted, NotPositiveDefinite> {
-        Restricted::new(self.noise.added_to(&self.covariance, ratio), &self.effects)
+    pub fn restricted(&self, ratio: f64) -> Result<RestrictedCovariance, NotPositiveDefinite> {
+        RestrictedCovariance::new(self.noise.added_to(&self.covariance, ratio), &self.effects)
     }
 
     /// τ, the amplitude variances over s².
@@ -311,7 +311,7 @@ impl<'a> Evidence<'a> {
     /// Fit of channel `c`; `white` is M·L⁻¹·y.
     pub fn channel(
         &self,
-        restricted: &Restricted,
+        restricted: &RestrictedCovariance,
         ratio: f64,
         c: usize,
         white: &ArrayView1<f64>,
@@ -333,14 +333,14 @@ impl<'a> Evidence<'a> {
     }
 
     /// ln of all determinants without a source's.
-    pub fn log_determinant(&self, restricted: &Restricted, ratio: f64) -> f64 {
+    pub fn log_determinant(&self, restricted: &RestrictedCovariance, ratio: f64) -> f64 {
         restricted.log_determinant + self.repeats.freedom * ratio.ln() + self.repeats.log_determinant
     }
 
     /// Residues of channel `c`, with |M·L⁻¹·y|² = `square`, without a source or with each source and amplitude.
     pub fn residues(
         &self,
-        restricted: &Restricted,
+        restricted: &RestrictedCovariance,
         ratio: f64,
         (c, square): (usize, f64),
         (sources, products): (&WhiteSources, &ArrayView1<f64>),

@@ -39,7 +39,7 @@ const LEAST_TO_WIDEN: usize = 19;
 /// Every fifth position is held out.
 pub(crate) const FOLDS: usize = 5;
 
-pub(super) struct Learnt {
+pub(super) struct InfluenceModel {
     /// All presses.
     pub pressed: CalibrationRows,
     /// Presses of the fit.
@@ -59,7 +59,7 @@ pub(super) struct Learnt {
     pub set_aside: Vec<usize>,
 }
 
-impl Learnt {
+impl InfluenceModel {
     /// Learns, or returns an earlier result of the task; `None` where forces do not separate influences from
     /// offsets, or no channel changes.
     pub fn of_task(
@@ -177,20 +177,20 @@ impl Learnt {
             let merged = merged.as_ref().unwrap_or(&pressed);
             (merged.condensed(&smooth.prior, &smooth.fits, most_presses, watch)?, None)
         };
-        let mut judged = vec![Judged::new(smooth, &presses, watch)?];
+        let mut scored = vec![ScoredFit::new(smooth, &presses, watch)?];
         if presses.positions_m().len() >= LEAST_TO_JUDGE
-            && let Some(sources) = search.sources(&judged[0].found.prior)?
+            && let Some(sources) = search.sources(&scored[0].found.prior)?
         {
-            match Judged::new(sources, &presses, watch) {
-                Ok(sources) => judged.push(sources),
+            match ScoredFit::new(sources, &presses, watch) {
+                Ok(sources) => scored.push(sources),
                 // Without the held-out positions the polynomials are unidentifiable: the prior has no score.
                 Err(MeasuredError::Noise(_)) => {}
                 Err(error) => return Err(error),
             }
         }
-        let lengths_m = judged[0].found.prior.lengths_m.clone();
-        let best = judged.into_iter().max_by(|a, b| a.score.total_cmp(&b.score));
-        let Some(Judged { found: Found { prior, fits, sensors_m }, widening, .. }) = best else {
+        let lengths_m = scored[0].found.prior.lengths_m.clone();
+        let best = scored.into_iter().max_by(|a, b| a.score.total_cmp(&b.score));
+        let Some(ScoredFit { found: StructureFit { prior, fits, sensors_m }, widening, .. }) = best else {
             return Ok(None);
         };
         let set_aside = set_aside.to_vec();
@@ -308,7 +308,7 @@ impl Learnt {
 }
 
 /// Result where presses do not determine offsets and influence functions.
-fn no_functions(structure: Structure, presses: usize) -> Result<Option<Learnt>, MeasuredError> {
+fn no_functions(structure: Structure, presses: usize) -> Result<Option<InfluenceModel>, MeasuredError> {
     if structure == Structure::Auto { Ok(None) } else { Err(MeasuredError::TooFewPresses { presses }) }
 }
 
@@ -322,20 +322,20 @@ fn dependence(prior: &Prior, presses: &CalibrationRows) -> f64 {
     1.0 + scattered * (MOVES_POSITION * presses.centre.len() as f64 - 1.0).max(0.0)
 }
 
-struct Found {
+struct StructureFit {
     prior: Prior,
     fits: Vec<ChannelFit>,
     sensors_m: Vec<Vec<f64>>,
 }
 
-struct Judged {
-    found: Found,
+struct ScoredFit {
+    found: StructureFit,
     score: f64,
     widening: f64,
 }
 
-impl Judged {
-    fn new(found: Found, presses: &CalibrationRows, watch: Watch) -> Result<Self, MeasuredError> {
+impl ScoredFit {
+    fn new(found: StructureFit, presses: &CalibrationRows, watch: Watch) -> Result<Self, MeasuredError> {
         let mut errors: Vec<[f64; 3]> = Vec::new();
         for (held, kept) in folds(presses) {
             watch.round()?;
@@ -376,14 +376,14 @@ fn folds(presses: &CalibrationRows) -> Vec<(Vec<usize>, Vec<usize>)> {
     (0..FOLDS).map(|fold| (0..presses.len()).partition(|i| fold_of(*i) == Some(fold))).collect()
 }
 
-impl Learnt {
+impl InfluenceModel {
     /// Length scale of the finest influence functions along an axis; 0 with point sensors, which have none.
     pub fn finest_m(&self, k: usize) -> f64 {
         if self.average.has_source() { 0.0 } else { self.average.shortest_m(k) }
     }
 }
 
-impl Found {
+impl StructureFit {
     /// Adds squared errors of presses `held`, predicted from `kept`, and their variances.
     fn add_errors(
         &self,
@@ -458,7 +458,7 @@ impl Search<'_> {
     }
 
     /// Searches kernel, length scales, drift, scatter, response and nonlinearity in turn.
-    fn smooth(&mut self) -> Result<Found, Cancelled> {
+    fn smooth(&mut self) -> Result<StructureFit, Cancelled> {
         let noise_by_place = self.noise.cloned();
         let rough = Prior { noise_by_place, ..Prior::smooth(self.extent, self.presses) };
         self.total_anew(&rough, &[])?;
@@ -497,7 +497,7 @@ impl Search<'_> {
         prior: &Prior,
         sensors_m: &[Vec<f64>],
     ) -> Result<Option<(f64, Prior)>, Cancelled> {
-        if !self.presses.tells_drift() {
+        if !self.presses.identifies_drift() {
             return Ok(None);
         }
         let drifts = DriftCourse::ALL
@@ -564,7 +564,7 @@ impl Search<'_> {
     }
 
     /// Maximizes the evidence of point sensors; `None` with too few presses or positions for the polynomials.
-    fn sources(&mut self, smooth: &Prior) -> Result<Option<Found>, Cancelled> {
+    fn sources(&mut self, smooth: &Prior) -> Result<Option<StructureFit>, Cancelled> {
         /// η² and ℓ, in lengths of the surface; a plane needs a smooth part.
         const SHARES: [f64; 4] = [0.0, 1e-4, 1e-2, 1.0];
         const LENGTHS: [f64; 4] = [0.1, 0.2, 0.4, 0.8];
@@ -623,10 +623,10 @@ impl Search<'_> {
         Ok(Some(self.found(prior, &sensors_m)))
     }
 
-    fn found(&self, prior: Prior, sensors_m: &[Vec<f64>]) -> Found {
+    fn found(&self, prior: Prior, sensors_m: &[Vec<f64>]) -> StructureFit {
         let evidence = Evidence::new(self.presses, &prior, sensors_m);
         let fits = evidence.best_decades(ALL_DECADES).map(|fits| evidence.refined(fits)).unwrap_or_default();
-        Found { prior, fits, sensors_m: sensors_m.to_vec() }
+        StructureFit { prior, fits, sensors_m: sensors_m.to_vec() }
     }
 
     /// Climbs along one length scale at a time.

@@ -90,9 +90,9 @@ impl Tables {
     /// the nodes.
     pub fn are_open(&self, force_n: f64) -> bool {
         const LEAST: f64 = 2.0;
-        let open = |variances: &[f64]| force_n * force_n * variances.iter().sum::<f64>();
+        let ratio = |variances: &[f64]| force_n * force_n * variances.iter().sum::<f64>();
         let places = self.variances.chunks(self.offsets.len().max(1));
-        median(places.map(open).collect()).is_some_and(|open| open > LEAST)
+        median(places.map(ratio).collect()).is_some_and(|ratio| ratio > LEAST)
     }
 }
 
@@ -162,7 +162,7 @@ pub struct ForceLinearLocator {
     /// f, v and β.
     pub(super) layers: Layers,
     /// ω.
-    pub(super) open: Vec<Lanes>,
+    pub(super) offset_variance: Vec<Lanes>,
     /// r: independent share of the posterior variance.
     pub(super) own: Vec<Lanes>,
     /// u: loadings on common-mode errors.
@@ -211,7 +211,7 @@ impl Stored {
                 let Tables { values, variances, covariances, .. } = &self.functions;
                 [values, variances, covariances][layer][place * self.live.len() + channel]
             }),
-            open: in_lanes(&self.functions.offset_variances),
+            offset_variance: in_lanes(&self.functions.offset_variances),
             own: in_lanes(&self.own_shares()),
             shared: in_lanes(&self.shared_errors),
             scan: CellScan::Bounded(Scan::default()),
@@ -501,9 +501,13 @@ impl ForceLinearLocator {
         };
         let change = move |Contact { position, force_n }: Contact| {
             let values = self.influences_at(position);
-            let open = &self.stored.functions.offset_variances;
+            let offset_variance = &self.stored.functions.offset_variances;
             let response_n = self.stored.prior.response_n(force_n);
-            values.iter().zip(open).map(|(f, open)| response_n * f / (1.0 + open).sqrt()).collect()
+            values
+                .iter()
+                .zip(offset_variance)
+                .map(|(f, offset_variance)| response_n * f / (1.0 + offset_variance).sqrt())
+                .collect()
         };
         let noise_sds = self.noise_of_channels().into_iter().enumerate();
         let noise_sds = noise_sds.filter_map(|(channel, sd)| Some((channel, sd?))).collect();
@@ -514,8 +518,10 @@ impl ForceLinearLocator {
     pub fn noise_of_channels(&self) -> Vec<Option<f64>> {
         let Tables { noise_sd, offset_variances, .. } = &self.stored.functions;
         let mut sds = vec![None; self.stored.channels];
-        for (channel, (sd, open)) in self.stored.live.iter().zip(noise_sd.iter().zip(offset_variances)) {
-            sds[*channel] = Some(sd * (1.0 + open).sqrt());
+        for (channel, (sd, offset_variance)) in
+            self.stored.live.iter().zip(noise_sd.iter().zip(offset_variances))
+        {
+            sds[*channel] = Some(sd * (1.0 + offset_variance).sqrt());
         }
         sds
     }
@@ -559,12 +565,12 @@ impl ForceLinearLocator {
         let together = 1.0 + self.stored.shared_errors.iter().map(|loading| loading * loading).sum::<f64>();
         let channel = |place: usize, c: usize| {
             let Place { values, variances, covariances } = self.place(place);
-            let open = self.stored.functions.offset_variances[c];
+            let offset_variance = self.stored.functions.offset_variances[c];
             let noise = self.noise() * self.noise_at(self.node(place));
             let (v, beta) = (variances[c], covariances[c]);
             let told = if v > 0.0 { beta * beta / v } else { 0.0 };
-            let least = (noise + own[c] * (open - told).max(0.0)).powf(as_one.recip());
-            ChannelAtPlace { f: values[c], noise, open, beta, v, least }
+            let least = (noise + own[c] * (offset_variance - told).max(0.0)).powf(as_one.recip());
+            ChannelAtPlace { f: values[c], noise, offset_variance, beta, v, least }
         };
         let bounded = |expected: [f64; 2], hardest_n: f64| {
             CellScan::Bounded(Scan::new(
@@ -573,10 +579,10 @@ impl ForceLinearLocator {
                 expected,
                 self.known_response_n(),
                 |place, c| {
-                    let ChannelAtPlace { f, noise, open, beta, v, least } = channel(place, c);
-                    let hardest =
-                        noise + together * (open + hardest_n * (2.0 * beta + hardest_n * v)).max(0.0);
-                    (f, [least, as_one * hardest.max(noise + together * open)])
+                    let ChannelAtPlace { f, noise, offset_variance, beta, v, least } = channel(place, c);
+                    let hardest = noise
+                        + together * (offset_variance + hardest_n * (2.0 * beta + hardest_n * v)).max(0.0);
+                    (f, [least, as_one * hardest.max(noise + together * offset_variance)])
                 },
             ))
         };
@@ -605,15 +611,19 @@ impl ForceLinearLocator {
 
     /// Detection test by a reading's square and its reduction by the best contact.
     fn is_no_contact(&self, relative: &[f64]) -> bool {
-        let open = &self.stored.functions.offset_variances;
-        let square: f64 = relative.iter().zip(open).map(|(d, open)| d * d / (1.0 + open)).sum();
+        let offset_variance = &self.stored.functions.offset_variances;
+        let square: f64 = relative
+            .iter()
+            .zip(offset_variance)
+            .map(|(d, offset_variance)| d * d / (1.0 + offset_variance))
+            .sum();
         if square > self.noise_bound || !self.tells_untouched {
             return false;
         }
         let taken = |place: usize| {
-            let channels = relative.iter().zip(self.place(place).values).zip(open);
-            let (fd, ff) = channels.fold((0.0, 0.0), |(fd, ff), ((d, f), open)| {
-                let scaled = f / (1.0 + open);
+            let channels = relative.iter().zip(self.place(place).values).zip(offset_variance);
+            let (fd, ff) = channels.fold((0.0, 0.0), |(fd, ff), ((d, f), offset_variance)| {
+                let scaled = f / (1.0 + offset_variance);
                 (fd + scaled * d, ff + scaled * f)
             });
             if fd > 0.0 { fd * fd / ff } else { 0.0 }
@@ -634,10 +644,10 @@ impl ForceLinearLocator {
         const SHARE: f64 = 0.5;
         const HIDDEN: usize = 4;
         let force_n = SHARE * self.known_response_n().unwrap_or(self.stored.mean_force_n);
-        let is_told = |open: &dyn Fn(usize) -> f64| {
+        let is_told = |offset_variance: &dyn Fn(usize) -> f64| {
             let square = |place: usize| -> f64 {
                 let values = self.place(place).values.iter().enumerate();
-                force_n * force_n * values.map(|(c, f)| f * f / (1.0 + open(c))).sum::<f64>()
+                force_n * force_n * values.map(|(c, f)| f * f / (1.0 + offset_variance(c))).sum::<f64>()
             };
             let hidden = (0..self.places()).filter(|place| square(*place) <= self.detection_bound).count();
             HIDDEN * hidden <= self.places()

@@ -22,11 +22,11 @@ mod place_noise;
 mod place_noise_search;
 mod posterior;
 mod prior;
+mod reading_likelihood;
 mod residuals;
 mod saturation;
 mod saturation_fit;
 mod scan;
-mod seen;
 mod shared_errors;
 mod source_grid;
 mod systematic_sample;
@@ -47,7 +47,7 @@ use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::status::FalseAlarmRate;
 use force_prior::PressForces;
-use learning::Learnt;
+use learning::InfluenceModel;
 use locator::{Stored, Tables};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::mean;
@@ -99,7 +99,7 @@ fn fit_condensed(
     let FitTask { setup, recording, watch, .. } = task;
     recording.check_distinct_positions(LEAST_POSITIONS)?;
     let extent = setup.surface().extent();
-    let Some(learnt) = Learnt::of_task(task, structure, most)? else { return Ok(None) };
+    let Some(learnt) = InfluenceModel::of_task(task, structure, most)? else { return Ok(None) };
     let (presses, prior) = (&learnt.pressed, &learnt.prior);
     if structure == Structure::Auto && !prior.is_separable() {
         return Ok(None);
@@ -158,7 +158,7 @@ pub(super) fn offset_course(
 ) -> Result<Option<OffsetCourse>, MeasuredError> {
     let recording = task.recording;
     let Some((own_s, asked_s)) = recording.times_s().zip(asked.times_s()) else { return Ok(None) };
-    let Some(learnt) = Learnt::of_task(task, structure, MOST_PRESSES)? else { return Ok(None) };
+    let Some(learnt) = InfluenceModel::of_task(task, structure, MOST_PRESSES)? else { return Ok(None) };
     // Without separability, the order of positions or of a nuisance coordinate would pass for drift.
     if !learnt.prior.is_separable() {
         return Ok(None);
@@ -174,7 +174,7 @@ pub(super) fn offset_course(
     Ok(Some(course))
 }
 
-fn axes(learnt: &Learnt, extent: Extent) -> [Axis; 2] {
+fn axes(learnt: &InfluenceModel, extent: Extent) -> [Axis; 2] {
     let positions_m = learnt.pressed.positions_m();
     let axis = |k: usize, most: usize| {
         let values = positions_m.iter().map(|position_m| position_m[k]).collect();

@@ -26,21 +26,23 @@ impl OutlierTest<'_> {
     ) -> Result<Vec<usize>, NotPositiveDefinite> {
         const TAIL: f64 = 1e-2;
         /// Share of the own noise in an error's variance.
-        const LEAST_TOLD: f64 = 1e-6;
+        const LEAST_NOISE_SHARE: f64 = 1e-6;
         let n = presses.len();
-        let Residuals { squares, told, freedom } =
+        let Residuals { squares, noise_shares, freedom } =
             Residuals::new(presses, self.prior, self.fits, self.sensors_m)?;
         let freedom = freedom - 3.0;
         if freedom < 5.0 {
             return Ok(Vec::new());
         }
         let freedom = freedom + tested.saturating_sub(n) as f64;
-        let externally = |square: f64, told: f64| {
+        let externally = |square: f64, noise_shares: f64| {
             let others = (freedom - square).max(1e-3 * freedom);
             // The others do not predict an isolated press.
-            if told < LEAST_TOLD { 0.0 } else { square * (freedom - 1.0) / others }
+            if noise_shares < LEAST_NOISE_SHARE { 0.0 } else { square * (freedom - 1.0) / others }
         };
-        let squares = Zip::from(&squares).and(&told).map_collect(|square, told| externally(*square, *told));
+        let squares = Zip::from(&squares)
+            .and(&noise_shares)
+            .map_collect(|square, noise_shares| externally(*square, *noise_shares));
         let channels = self.fits.len();
         let bound = |count: usize, tests: usize| {
             let bound = chi_squared_critical_value(TAIL / tests as f64, count);

@@ -27,7 +27,7 @@ pub(super) struct PlaceNoiseSearch<'a> {
     pub watch: Watch<'a>,
 }
 
-struct Fitted {
+struct NoiseFit {
     prior: Prior,
     fits: Vec<ChannelFit>,
     total: f64,
@@ -113,7 +113,7 @@ impl PlaceNoiseSearch<'_> {
         Ok(best.map(|(_, noise)| noise.towards_quiet()))
     }
 
-    fn fitted(&self, prior: Prior, about: Option<&[ChannelFit]>) -> Option<Fitted> {
+    fn fitted(&self, prior: Prior, about: Option<&[ChannelFit]>) -> Option<NoiseFit> {
         let evidence = Evidence::new(self.presses, &prior, self.sensors_m);
         let coarse = match about {
             Some(fits) => fits.to_vec(),
@@ -121,10 +121,10 @@ impl PlaceNoiseSearch<'_> {
         };
         let fits = evidence.refined(coarse);
         let total = fits.iter().map(|fit| fit.evidence).sum::<f64>();
-        total.is_finite().then_some(Fitted { prior, fits, total })
+        total.is_finite().then_some(NoiseFit { prior, fits, total })
     }
 
-    fn step(&self, from: &Fitted, places_m: &[&[f64]]) -> Result<Option<Fitted>, MeasuredError> {
+    fn step(&self, from: &NoiseFit, places_m: &[&[f64]]) -> Result<Option<NoiseFit>, MeasuredError> {
         const LONGEST: f64 = 1.5;
         let Some(noise) = &from.prior.noise_by_place else { return Ok(None) };
         let residuals = Residuals::new(self.presses, &from.prior, &from.fits, self.sensors_m)?;
@@ -138,10 +138,15 @@ impl PlaceNoiseSearch<'_> {
         Ok(self.fitted(prior, Some(&from.fits)))
     }
 
-    fn score(&self, at: &Fitted, residuals: &Residuals, noise: &PlaceNoise) -> Result<Score, MeasuredError> {
+    fn score(
+        &self,
+        at: &NoiseFit,
+        residuals: &Residuals,
+        noise: &PlaceNoise,
+    ) -> Result<Score, MeasuredError> {
         /// Prior precision of θ.
         const PRECISION: f64 = 0.05;
-        let Fitted { prior, fits, .. } = at;
+        let NoiseFit { prior, fits, .. } = at;
         let (presses, repeated) = (self.presses, &self.presses.repeats);
         let places_m = presses.positions_m();
         let slopes_of = |positions_m: &[Vec<f64>], force_n: &[f64]| {
@@ -157,8 +162,12 @@ impl PlaceNoiseSearch<'_> {
         let mut information = PRECISION * Array2::eye(terms);
         for (c, fit) in fits.iter().enumerate() {
             let errors = (0..presses.len()).map(|i| {
-                let (told, square) = (residuals.told[[i, c]], residuals.squares[[i, c]]);
-                (of_presses.row(i), if square.is_finite() { told.clamp(0.0, 1.0) } else { 0.0 }, square)
+                let (noise_share, square) = (residuals.noise_shares[[i, c]], residuals.squares[[i, c]]);
+                (
+                    of_presses.row(i),
+                    if square.is_finite() { noise_share.clamp(0.0, 1.0) } else { 0.0 },
+                    square,
+                )
             });
             let repeats = (0..repeated.degrees_of_freedom.len()).map(|i| {
                 let noise = fit.noise_variance()
@@ -166,19 +175,21 @@ impl PlaceNoiseSearch<'_> {
                 let freedom = repeated.degrees_of_freedom[i];
                 (of_repeats.row(i), freedom, repeated.squares[[i, c]] / (freedom * noise))
             });
-            let all: Vec<_> = errors.chain(repeats).filter(|(_, told, _)| *told > 0.0).collect();
-            let weight: f64 = all.iter().map(|(_, told, _)| told).sum();
-            let square: f64 = all.iter().map(|(_, told, square)| told * square).sum::<f64>() / weight;
+            let all: Vec<_> =
+                errors.chain(repeats).filter(|(_, noise_share, _)| *noise_share > 0.0).collect();
+            let weight: f64 = all.iter().map(|(_, noise_share, _)| noise_share).sum();
+            let square: f64 =
+                all.iter().map(|(_, noise_share, square)| noise_share * square).sum::<f64>() / weight;
             if weight.is_nan() || weight <= 0.0 || square.is_nan() || square <= 0.0 {
                 continue;
             }
             let mut middle = Array1::<f64>::zeros(terms);
-            all.iter().for_each(|(row, told, _)| middle.scaled_add(told / weight, row));
-            for (row, told, own) in all {
+            all.iter().for_each(|(row, noise_share, _)| middle.scaled_add(noise_share / weight, row));
+            for (row, noise_share, own) in all {
                 let row = &row - &middle;
-                slope.scaled_add(0.5 * told * (own / square - 1.0), &row);
+                slope.scaled_add(0.5 * noise_share * (own / square - 1.0), &row);
                 for k in 0..terms {
-                    information.row_mut(k).scaled_add(0.5 * told * row[k], &row);
+                    information.row_mut(k).scaled_add(0.5 * noise_share * row[k], &row);
                 }
             }
         }

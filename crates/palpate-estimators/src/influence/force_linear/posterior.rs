@@ -6,7 +6,7 @@
 //! its projected functional; differences between sources add variance.
 
 use super::drift::END;
-use super::evidence::{ChannelFit, Evidence, Restricted, SourceFit, WhiteSources};
+use super::evidence::{ChannelFit, Evidence, RestrictedCovariance, SourceFit, WhiteSources};
 use super::noise_prior::NoiseDensity;
 use super::prior::Prior;
 use crate::influence::calibration::CalibrationRows;
@@ -165,8 +165,8 @@ pub(super) fn functions(
     places_m: &[Vec<f64>],
     watch: Watch,
 ) -> Result<Vec<Functions>, MeasuredError> {
-    let told = Posterior::new(conditions, presses, sensors_m)?;
-    let empty = |channel: &Told| Functions {
+    let posterior = Posterior::new(conditions, presses, sensors_m)?;
+    let empty = |channel: &ChannelPosterior| Functions {
         offset: presses.centre[channel.c],
         noise_variance: channel.signal * conditions.ratio,
         values: Vec::with_capacity(places_m.len()),
@@ -174,12 +174,12 @@ pub(super) fn functions(
         variances: Vec::with_capacity(places_m.len()),
         covariances: Vec::with_capacity(places_m.len()),
     };
-    let mut functions: Vec<Functions> = told.channels.iter().map(empty).collect();
+    let mut functions: Vec<Functions> = posterior.channels.iter().map(empty).collect();
     for block in places_m.chunks(BLOCK) {
         watch.round()?;
         let influences = block.iter().map(Functional::influence);
         let asked: Vec<Functional> = std::iter::once(Functional::offset_at(END)).chain(influences).collect();
-        for (moments, out) in told.moments(&asked).into_iter().zip(&mut functions) {
+        for (moments, out) in posterior.moments(&asked).into_iter().zip(&mut functions) {
             let (offset, influences) = (moments[0], &moments[1..]);
             if out.values.is_empty() {
                 out.offset += offset.mean;
@@ -200,13 +200,13 @@ pub(super) fn readings(
     sensors_m: &[Vec<f64>],
     others: &CalibrationRows,
 ) -> Result<Vec<Vec<(f64, f64)>>, MeasuredError> {
-    let told = Posterior::new(conditions, presses, sensors_m)?;
-    let moments = told.moments(&Functional::readings(conditions.prior, others));
-    let of_channel = |(channel, moments): (&Told, Vec<Moments>)| {
+    let posterior = Posterior::new(conditions, presses, sensors_m)?;
+    let moments = posterior.moments(&Functional::readings(conditions.prior, others));
+    let of_channel = |(channel, moments): (&ChannelPosterior, Vec<Moments>)| {
         let centre = presses.centre[channel.c];
         moments.iter().map(|moments| (centre + moments.mean, moments.variance)).collect()
     };
-    Ok(told.channels.iter().zip(moments).map(of_channel).collect())
+    Ok(posterior.channels.iter().zip(moments).map(of_channel).collect())
 }
 
 pub(super) fn offsets(
@@ -220,9 +220,9 @@ pub(super) fn offsets(
     let mut all = vec![Vec::new(); fits.len()];
     for channels in of_equal_ratio(fits) {
         let conditions = Conditions::of_fits(prior, fits, &channels);
-        let told = Posterior::new(&conditions, presses, sensors_m)?;
+        let posterior = Posterior::new(&conditions, presses, sensors_m)?;
         for block in asked.chunks(BLOCK) {
-            for (c, moments) in channels.iter().zip(told.moments(block)) {
+            for (c, moments) in channels.iter().zip(posterior.moments(block)) {
                 let mean_and_variance = |found: &Moments| (presses.centre[*c] + found.mean, found.variance);
                 all[*c].extend(moments.iter().map(mean_and_variance));
             }
@@ -234,8 +234,8 @@ pub(super) fn offsets(
 struct Posterior<'a> {
     prior: &'a Prior,
     presses: &'a CalibrationRows,
-    known: Known,
-    channels: Vec<Told>,
+    solution: GeneralizedLeastSquares,
+    channels: Vec<ChannelPosterior>,
 }
 
 impl<'a> Posterior<'a> {
@@ -246,67 +246,67 @@ impl<'a> Posterior<'a> {
     ) -> Result<Self, MeasuredError> {
         let Conditions { prior, ratio, ref channels, densities } = *conditions;
         let evidence = Evidence::new(presses, prior, sensors_m).with_noise(densities);
-        let known = Known::new(&evidence, ratio)?;
+        let solution = GeneralizedLeastSquares::new(&evidence, ratio)?;
         let columns = evidence.sources.clone();
-        let coarse = Sources::of_columns(&evidence, &known, sensors_m.to_vec(), columns);
+        let coarse = Sources::of_columns(&evidence, &solution, sensors_m.to_vec(), columns);
         let channel = |(c, signal): &(usize, Option<f64>)| {
-            let sources = coarse.closer(&evidence, &known, *c);
-            Told { c: *c, signal: signal.unwrap_or(sources.signal), sources }
+            let sources = coarse.closer(&evidence, &solution, *c);
+            ChannelPosterior { c: *c, signal: signal.unwrap_or(sources.signal), sources }
         };
         let channels = channels.iter().map(channel).collect();
-        Ok(Self { prior, presses, known, channels })
+        Ok(Self { prior, presses, solution, channels })
     }
 
     fn moments(&self, asked: &[Functional]) -> Vec<Vec<Moments>> {
-        let Self { prior, presses, known, channels } = self;
-        let asked = Functionals::new(prior, presses, known.ratio, asked);
-        let explained = known.restricted.cholesky.solve_lower_matrix(asked.covariance.clone());
-        let open = known.restricted.open_effects(&asked.effects, &explained);
-        let within = Within::new(&asked, [&explained, &open]);
-        let own: Vec<usize> = channels.iter().map(|told| told.c).collect();
-        let means = asked.effects.t().dot(&known.coefficients.select(Dimension(1), &own))
-            + explained.t().dot(&known.white.select(Dimension(1), &own));
-        let of_channel = |(told, means): (&Told, ArrayView1<f64>)| {
-            told.moments(prior, &asked, &means, &explained.view(), &within)
+        let Self { prior, presses, solution, channels } = self;
+        let asked = Functionals::new(prior, presses, solution.ratio, asked);
+        let explained = solution.restricted.cholesky.solve_lower_matrix(asked.covariance.clone());
+        let unexplained = solution.restricted.unexplained_effects(&asked.effects, &explained);
+        let process = ProcessVariances::new(&asked, [&explained, &unexplained]);
+        let own: Vec<usize> = channels.iter().map(|posterior| posterior.c).collect();
+        let means = asked.effects.t().dot(&solution.coefficients.select(Dimension(1), &own))
+            + explained.t().dot(&solution.white.select(Dimension(1), &own));
+        let of_channel = |(posterior, means): (&ChannelPosterior, ArrayView1<f64>)| {
+            posterior.moments(prior, &asked, &means, &explained.view(), &process)
         };
         channels.iter().zip(means.columns()).map(of_channel).collect()
     }
 }
 
 /// Posterior variances without sources, over s².
-struct Within {
+struct ProcessVariances {
     variance: Vec<f64>,
     with_first: Vec<f64>,
 }
 
-impl Within {
+impl ProcessVariances {
     /// Sums from L⁻¹·k and R⁻ᵀ·(h − Hᵀ·A⁻¹·k).
-    fn new(asked: &Functionals, [explained, open]: [&Array2<f64>; 2]) -> Self {
-        let mut within =
+    fn new(asked: &Functionals, [explained, unexplained]: [&Array2<f64>; 2]) -> Self {
+        let mut process =
             Self { variance: asked.variance.clone(), with_first: vec![0.0; asked.variance.len()] };
-        for (sign, rows) in [(-1.0, explained), (1.0, open)] {
+        for (sign, rows) in [(-1.0, explained), (1.0, unexplained)] {
             for row in rows.outer_iter() {
                 let first = sign * row.first().copied().unwrap_or(0.0);
-                let sums = within.variance.iter_mut().zip(&mut within.with_first);
+                let sums = process.variance.iter_mut().zip(&mut process.with_first);
                 for ((variance, with_first), value) in sums.zip(&row) {
                     *variance += sign * value * value;
                     *with_first += first * value;
                 }
             }
         }
-        within
+        process
     }
 }
 
-struct Known {
+struct GeneralizedLeastSquares {
     ratio: f64,
-    restricted: Restricted,
+    restricted: RestrictedCovariance,
     /// M·L⁻¹·y and the coefficients of H, by channels.
     white: Array2<f64>,
     coefficients: Array2<f64>,
 }
 
-impl Known {
+impl GeneralizedLeastSquares {
     fn new(evidence: &Evidence, ratio: f64) -> Result<Self, NotPositiveDefinite> {
         let restricted = evidence.restricted(ratio)?;
         let (white, coefficients) = restricted.residuals(evidence.presses.means.clone());
@@ -326,37 +326,37 @@ struct Sources {
 }
 
 impl Sources {
-    fn new(evidence: &Evidence, known: &Known, sensors_m: Vec<Vec<f64>>) -> Self {
+    fn new(evidence: &Evidence, solution: &GeneralizedLeastSquares, sensors_m: Vec<Vec<f64>>) -> Self {
         let columns = evidence.prior.sources(evidence.presses, &sensors_m);
-        Self::of_columns(evidence, known, sensors_m, columns)
+        Self::of_columns(evidence, solution, sensors_m, columns)
     }
 
     /// Sources with the readings `columns`.
     fn of_columns(
         evidence: &Evidence,
-        known: &Known,
+        solution: &GeneralizedLeastSquares,
         sensors_m: Vec<Vec<f64>>,
         columns: Array2<f64>,
     ) -> Self {
-        let (white, coefficients) = known.restricted.residuals(columns);
-        let white = WhiteSources::new(white, &evidence.amplitudes(known.ratio));
+        let (white, coefficients) = solution.restricted.residuals(columns);
+        let white = WhiteSources::new(white, &evidence.amplitudes(solution.ratio));
         Self { sensors_m, white, coefficients, fits: Vec::new(), signal: 1.0 }
     }
 
-    fn fitted(self, evidence: &Evidence, known: &Known, c: usize) -> Self {
-        let white = known.white.slice(s![.., c..=c]);
+    fn fitted(self, evidence: &Evidence, solution: &GeneralizedLeastSquares, c: usize) -> Self {
+        let white = solution.white.slice(s![.., c..=c]);
         let products = self.white.products(&white);
         let sources = (&self.white, &products.column(0));
-        let fit = evidence.channel(&known.restricted, known.ratio, c, &white.column(0), sources);
+        let fit = evidence.channel(&solution.restricted, solution.ratio, c, &white.column(0), sources);
         Self { fits: fit.sources, signal: fit.signal, ..self }
     }
 
     /// Refines positions until the presses hardly resolve neighbours.
-    fn closer(&self, evidence: &Evidence, known: &Known, c: usize) -> Self {
+    fn closer(&self, evidence: &Evidence, solution: &GeneralizedLeastSquares, c: usize) -> Self {
         const ROUNDS: usize = 4;
         const ENOUGH: usize = 12;
         const NEXT: [usize; 2] = [80, 14];
-        let mut found = self.clone().fitted(evidence, known, c);
+        let mut found = self.clone().fitted(evidence, solution, c);
         for _ in 0..ROUNDS {
             let dimensions = found.sensors_m.first().map_or(0, Vec::len);
             let spans: Vec<(f64, f64, usize)> = (0..dimensions).map(|k| found.probable(k)).collect();
@@ -372,7 +372,7 @@ impl Sources {
                 [x, y] => axis(x).flat_map(|x_m| axis(y).map(move |y_m| vec![x_m, y_m])).collect(),
                 _ => break,
             };
-            found = Self::new(evidence, known, places_m).fitted(evidence, known, c);
+            found = Self::new(evidence, solution, places_m).fitted(evidence, solution, c);
         }
         found
     }
@@ -394,13 +394,13 @@ impl Sources {
     }
 }
 
-struct Told {
+struct ChannelPosterior {
     c: usize,
     signal: f64,
     sources: Sources,
 }
 
-impl Told {
+impl ChannelPosterior {
     /// `base` are the means without sources.
     fn moments(
         &self,
@@ -408,7 +408,7 @@ impl Told {
         asked: &Functionals,
         base: &ArrayView1<f64>,
         explained: &ArrayView2<f64>,
-        within: &Within,
+        process: &ProcessVariances,
     ) -> Vec<Moments> {
         let used: Vec<usize> = {
             let mut places: Vec<usize> = self.sources.fits.iter().map(|source| source.place).collect();
@@ -429,8 +429,8 @@ impl Told {
         let first_shift: f64 = shift_of(0);
         let moments = |k: usize| {
             let shift: f64 = shift_of(k);
-            let mut variance = self.signal * within.variance[k];
-            let mut covariance = self.signal * within.with_first[k];
+            let mut variance = self.signal * process.variance[k];
+            let mut covariance = self.signal * process.with_first[k];
             for (j, f) in &sources {
                 let (r, first) = (rest[[k, *j]], rest[[0, *j]]);
                 variance += f.weight * (self.signal * f.variance * r * r + (r * f.amplitude - shift).powi(2));

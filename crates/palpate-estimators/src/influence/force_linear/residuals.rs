@@ -13,7 +13,7 @@ pub(super) struct Residuals {
     /// Squared residuals over their variance.
     pub squares: Array2<f64>,
     /// Share of the own noise in this variance.
-    pub told: Array2<f64>,
+    pub noise_shares: Array2<f64>,
     pub freedom: f64,
 }
 
@@ -26,7 +26,7 @@ impl Residuals {
     ) -> Result<Self, NotPositiveDefinite> {
         let n = presses.len();
         let mut squares = Array2::<f64>::zeros((n, fits.len()));
-        let mut told = squares.clone();
+        let mut noise_shares = squares.clone();
         let mut freedom = f64::INFINITY;
         let noise: Vec<f64> =
             (0..n).map(|i| prior.relative_noise_of(presses, i) / presses.count[i]).collect();
@@ -53,11 +53,11 @@ impl Residuals {
                 }
                 let errors = projection.dot(&left);
                 for i in 0..n {
-                    told[[i, c]] = diagonal[i] * ratio * noise[i];
+                    noise_shares[[i, c]] = diagonal[i] * ratio * noise[i];
                     squares[[i, c]] = errors[i].powi(2) / (diagonal[i] * fits[c].signal);
                 }
             }
         }
-        Ok(Self { squares, told, freedom })
+        Ok(Self { squares, noise_shares, freedom })
     }
 }

@@ -4,7 +4,7 @@
 //! *Journal of the Royal Statistical Society B* 26, 1964). The prior is that of raw presses without scatter,
 //! which resembles saturation.
 
-use super::learning::{Learnt, MOST_PRESSES, MOST_SEARCHED};
+use super::learning::{InfluenceModel, MOST_PRESSES, MOST_SEARCHED};
 use super::saturation::Saturation;
 use crate::fit::FitTask;
 use crate::influence::calibration::relative_times;
@@ -17,13 +17,13 @@ use std::sync::Arc;
 pub(super) struct Linearization {
     pub recording: Recording,
     pub saturation: Saturation,
-    learnt: Arc<Learnt>,
+    learnt: Arc<InfluenceModel>,
 }
 
 impl Linearization {
     /// Estimates the saturation; `None` without influence functions.
     pub fn new(task: FitTask) -> Result<Option<Self>, MeasuredError> {
-        let Some(learnt) = Learnt::of_task(task, Structure::ForceLinear, MOST_PRESSES)? else {
+        let Some(learnt) = InfluenceModel::of_task(task, Structure::ForceLinear, MOST_PRESSES)? else {
             return Ok(None);
         };
         let presses = PressDeviations::new(&learnt, task.recording)?;
@@ -79,7 +79,7 @@ struct PressDeviations<'a> {
 }
 
 impl<'a> PressDeviations<'a> {
-    fn new(learnt: &'a Learnt, recording: &'a Recording) -> Result<Self, MeasuredError> {
+    fn new(learnt: &'a InfluenceModel, recording: &'a Recording) -> Result<Self, MeasuredError> {
         let offsets = learnt.offsets_at_or_constant(&relative_times(recording))?;
         let rows = 0..recording.rows.len();
         let rows = rows.filter(|row| learnt.set_aside.binary_search(row).is_err()).collect();
@@ -87,7 +87,7 @@ impl<'a> PressDeviations<'a> {
     }
 
     /// All repeats of the presses of the hyperparameter search.
-    fn thinned(&self, learnt: &Learnt) -> Self {
+    fn thinned(&self, learnt: &InfluenceModel) -> Self {
         let first_rows = &learnt.pressed.row;
         let kept: Vec<usize> = thinned(first_rows.len(), MOST_SEARCHED).collect();
         let press_of = |row: &usize| first_rows.partition_point(|first| first <= row).saturating_sub(1);
@@ -121,7 +121,7 @@ impl<'a> PressDeviations<'a> {
 
     fn log_evidence(
         &self,
-        learnt: &Learnt,
+        learnt: &InfluenceModel,
         saturation: &Saturation,
         FitTask { setup, watch, .. }: FitTask,
     ) -> Result<f64, MeasuredError> {

@@ -12,7 +12,7 @@ pub(in crate::influence) struct Cells {
 
 /// Candidate of the coarse search.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::influence) struct Look {
+pub(in crate::influence) struct CellBound {
     /// Approximate χ² at the best amplitude.
     pub misfit: f64,
     /// χ² plus the other terms of −2·ln of the posterior density.
@@ -53,32 +53,32 @@ impl Cells {
     }
 
     /// Local minima in order of cost.
-    pub(super) fn valleys(self, looks: &[Look], most: usize) -> Vec<usize> {
+    pub(super) fn valleys(self, bounds: &[CellBound], most: usize) -> Vec<usize> {
         let counts @ [rows, columns] = self.counts();
         let cells = (0..rows).flat_map(|i| (0..columns).map(move |j| [i, j]));
         let mut valleys: Vec<usize> =
-            cells.filter(|cell| is_valley(looks, counts, *cell)).map(|[i, j]| i * columns + j).collect();
-        valleys.sort_by(|a, b| looks[*a].cost.total_cmp(&looks[*b].cost));
+            cells.filter(|cell| is_valley(bounds, counts, *cell)).map(|[i, j]| i * columns + j).collect();
+        valleys.sort_by(|a, b| bounds[*a].cost.total_cmp(&bounds[*b].cost));
         valleys.truncate(most);
         valleys
     }
 }
 
 /// Of equal cells, only the first is a minimum.
-fn is_valley(looks: &[Look], [rows, columns]: [usize; 2], [i, j]: [usize; 2]) -> bool {
+fn is_valley(bounds: &[CellBound], [rows, columns]: [usize; 2], [i, j]: [usize; 2]) -> bool {
     let around = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
     let cell = i * columns + j;
-    let cost = looks[cell].cost;
+    let cost = bounds[cell].cost;
     // Two neighbours exclude most cells.
-    let is_before = i > 0 && looks[cell - columns].cost <= cost;
-    let is_behind = i + 1 < rows && looks[cell + columns].cost < cost;
+    let is_before = i > 0 && bounds[cell - columns].cost <= cost;
+    let is_behind = i + 1 < rows && bounds[cell + columns].cost < cost;
     !is_before
         && !is_behind
         && cost.is_finite()
         && around(i, rows).all(|i| {
             around(j, columns).all(|j| {
                 let other = i * columns + j;
-                let from = looks[other].cost;
+                let from = bounds[other].cost;
                 !(from < cost || other < cell && from == cost)
             })
         })
@@ -88,38 +88,38 @@ pub(in crate::influence) trait CellBlocks {
     fn cells(&self) -> usize;
 
     /// χ², cost and amplitude of each cell of a block.
-    fn look<V: EightLanes>(&self, block: usize, reading: &[f64]) -> [V; 3];
+    fn bounds<V: EightLanes>(&self, block: usize, reading: &[f64]) -> [V; 3];
 }
 
-pub(in crate::influence) fn look_at_cells(
+pub(in crate::influence) fn bound_cells(
     blocks: &impl CellBlocks,
     reading: &[Lanes],
     channels: usize,
-    looks: &mut Vec<Look>,
+    bounds: &mut Vec<CellBound>,
 ) {
     let reading = &reading.as_flattened()[..channels];
-    InstructionSet::best().run(LookAtCells { blocks, reading, looks });
+    InstructionSet::best().run(BoundCells { blocks, reading, bounds });
 }
 
-struct LookAtCells<'a, C> {
+struct BoundCells<'a, C> {
     blocks: &'a C,
     reading: &'a [f64],
-    looks: &'a mut Vec<Look>,
+    bounds: &'a mut Vec<CellBound>,
 }
 
-impl<C: CellBlocks> Kernel for LookAtCells<'_, C> {
+impl<C: CellBlocks> Kernel for BoundCells<'_, C> {
     type Output = ();
     const FUSED: bool = true;
 
     #[inline(always)] // Compiled for the instructions of its caller.
     fn run<S: Simd>(self) {
-        let Self { blocks, reading, looks } = self;
-        looks.clear();
+        let Self { blocks, reading, bounds } = self;
+        bounds.clear();
         for block in 0..blocks.cells().div_ceil(LANES) {
             let [misfits, costs, latents] =
-                blocks.look::<S::F64>(block, reading).map(|eight| eight.to_array());
+                blocks.bounds::<S::F64>(block, reading).map(|eight| eight.to_array());
             for l in 0..LANES.min(blocks.cells() - LANES * block) {
-                looks.push(Look { misfit: misfits[l], cost: costs[l], latent: latents[l] });
+                bounds.push(CellBound { misfit: misfits[l], cost: costs[l], latent: latents[l] });
             }
         }
     }

@@ -1,14 +1,14 @@
 //! Local minima of a reading's cost, and their modes.
 
-use super::cells::Look;
-use super::{Explain, Explained};
+use super::cells::CellBound;
+use super::{ContactLikelihood, PlaceFit};
 use crate::influence::levenberg::{Unknowns, descend};
 use palpate_numerics::small::Matrix;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Minimum {
     pub at: Unknowns,
-    pub found: Explained,
+    pub found: PlaceFit,
     pub information: Matrix<3>,
 }
 
@@ -20,13 +20,13 @@ const MOST_VALLEYS: usize = 8;
 const SMALL: f64 = 1e-3;
 
 /// Returns the relevant minima, best first.
-pub(super) fn minima<E: Explain>(reading: &mut E, looks: &[Look]) -> Vec<Minimum> {
+pub(super) fn minima<E: ContactLikelihood>(reading: &mut E, bounds: &[CellBound]) -> Vec<Minimum> {
     let cells = reading.cells();
     let mut found: Vec<Minimum> = Vec::with_capacity(MOST_VALLEYS);
     let mut best = f64::INFINITY;
-    for cell in cells.valleys(looks, MOST_VALLEYS) {
-        let Look { latent, .. } = looks[cell];
-        if least_cost(reading, cell, &looks[cell]) > best + NEGLIGIBLE {
+    for cell in cells.valleys(bounds, MOST_VALLEYS) {
+        let CellBound { latent, .. } = bounds[cell];
+        if least_cost(reading, cell, &bounds[cell]) > best + NEGLIGIBLE {
             continue;
         }
         let [x, y] = cells.middle(cell).map(|node| node as f64);
@@ -47,7 +47,7 @@ pub(super) fn minima<E: Explain>(reading: &mut E, looks: &[Look]) -> Vec<Minimum
 }
 
 /// Approximate lower bound of the cost within a cell.
-pub(super) fn least_cost<E: Explain>(reading: &E, cell: usize, look: &Look) -> f64 {
+pub(super) fn least_cost<E: ContactLikelihood>(reading: &E, cell: usize, look: &CellBound) -> f64 {
     let cells = reading.cells();
     let [along, across] = reading.lengths(cells.middle(cell), look.latent);
     let [(x0, x1), (y0, y1)] = cells.span(cell);
@@ -57,7 +57,7 @@ pub(super) fn least_cost<E: Explain>(reading: &E, cell: usize, look: &Look) -> f
 }
 
 /// True of one local minimum: on the line between both the cost rises by at most 1.
-fn same<E: Explain>(reading: &mut E, a: &Minimum, b: &Minimum) -> bool {
+fn same<E: ContactLikelihood>(reading: &mut E, a: &Minimum, b: &Minimum) -> bool {
     const RISE: f64 = 1.0;
     const CLOSE: f64 = 0.05;
     let close = (0..2).all(|k| (a.at[k] - b.at[k]).abs() < CLOSE);
@@ -66,7 +66,7 @@ fn same<E: Explain>(reading: &mut E, a: &Minimum, b: &Minimum) -> bool {
 
 /// Returns the mode of each minimum; within a mode the density between minima stays above a hundredth of the
 /// best.
-pub(super) fn modes<E: Explain>(reading: &mut E, minima: &[Minimum]) -> Vec<usize> {
+pub(super) fn modes<E: ContactLikelihood>(reading: &mut E, minima: &[Minimum]) -> Vec<usize> {
     const VALLEY: f64 = 0.01;
     let rise = -2.0 * VALLEY.ln();
     let mut modes: Vec<usize> = Vec::with_capacity(minima.len());
@@ -80,17 +80,17 @@ pub(super) fn modes<E: Explain>(reading: &mut E, minima: &[Minimum]) -> Vec<usiz
     modes
 }
 
-fn highest_between<E: Explain>(reading: &mut E, a: &Minimum, b: &Minimum) -> f64 {
+fn highest_between<E: ContactLikelihood>(reading: &mut E, a: &Minimum, b: &Minimum) -> f64 {
     const STEPS: usize = 8;
     let costs = (1..STEPS).map(|step| {
         let t = step as f64 / STEPS as f64;
         let [x, y, latent] = std::array::from_fn(|k| a.at[k] + t * (b.at[k] - a.at[k]));
-        reading.explain([x, y], latent).cost
+        reading.fit_place([x, y], latent).cost
     });
     costs.fold(f64::NEG_INFINITY, f64::max)
 }
 
-fn refined<E: Explain>(reading: &mut E, start: Unknowns) -> Minimum {
+fn refined<E: ContactLikelihood>(reading: &mut E, start: Unknowns) -> Minimum {
     let [x, y] = reading.axes().map(|axis| (0.0, (axis.count - 1) as f64));
     let ends = [x, y, reading.range().unwrap_or((start[2], start[2]))];
     let descend_from = |reading: &mut E, start| {
@@ -101,6 +101,6 @@ fn refined<E: Explain>(reading: &mut E, start: Unknowns) -> Minimum {
     let start = [start[0], start[1], start[2].clamp(ends[2].0, ends[2].1)];
     let (near, _) = descend_from(reading, start);
     let (at, equations) = descend_from(reading, near);
-    let found = reading.explain([at[0], at[1]], at[2]);
+    let found = reading.fit_place([at[0], at[1]], at[2]);
     Minimum { at, found, information: equations.information }
 }

@@ -10,9 +10,9 @@ mod posterior;
 mod quadrature;
 mod tiles;
 
-pub(super) use cells::{CellBlocks, Cells, Look, look_at_cells};
+pub(super) use cells::{CellBlocks, CellBound, Cells, bound_cells};
 pub(super) use layers::{Layers, Slopes, Stencil};
-pub(super) use posterior::{Inversion, Limits, ToldForce};
+pub(super) use posterior::{ForceKnowledge, Inversion, Limits};
 pub(super) use quadrature::FIVE_POINTS;
 
 use super::grid::Axis;
@@ -20,7 +20,7 @@ use super::levenberg::{Equations, Unknowns};
 
 /// Fit of a reading at a place.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Explained {
+pub(super) struct PlaceFit {
     /// Least χ².
     pub misfit: f64,
     /// −2·ln of the posterior density, less a constant.
@@ -30,13 +30,13 @@ pub(super) struct Explained {
 }
 
 /// Likelihood of a reading; positions are in nodes.
-pub(super) trait Explain {
+pub(super) trait ContactLikelihood {
     fn axes(&self) -> [Axis; 2];
 
     fn cells(&self) -> Cells;
 
     /// Approximate lower bounds of the costs of all cells.
-    fn scan(&self, looks: &mut Vec<Look>);
+    fn scan(&self, bounds: &mut Vec<CellBound>);
 
     /// True where minima may be missing from these bounds.
     fn bounds_are_loose(&self) -> bool;
@@ -56,7 +56,7 @@ pub(super) trait Explain {
     fn spread(&mut self, at: Unknowns) -> f64;
 
     /// Fits a place, integrated over the latent number near `latent`.
-    fn explain(&mut self, place: [f64; 2], latent: f64) -> Explained;
+    fn fit_place(&mut self, place: [f64; 2], latent: f64) -> PlaceFit;
 
     /// Mean and variance of the force for those of the latent number.
     fn force(&self, latent: f64, variance: f64) -> (f64, f64);

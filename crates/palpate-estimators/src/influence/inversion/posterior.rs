@@ -3,11 +3,11 @@
 //! [Quadrature](super::quadrature) integrates a single, nearly normal mode, [tiles](super::tiles) all other
 //! posteriors.
 
-use super::cells::Look;
+use super::cells::CellBound;
 use super::minima::{Minimum, minima, modes};
-use super::quadrature::{self, Weighed};
+use super::quadrature::{self, WeightedPlace};
 use super::tiles::{CUT, Lattice, Leaf, candidates};
-use super::{Explain, Explained};
+use super::{ContactLikelihood, PlaceFit};
 use crate::influence::grid::{Axis, is_margin, middle};
 use crate::influence::moments::Moments;
 use crate::status::OTHER_PLACE;
@@ -17,12 +17,12 @@ use palpate_numerics::{extend_to, normal_interval_95};
 
 /// Source of the force of an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::influence) enum ToldForce {
+pub(in crate::influence) enum ForceKnowledge {
     Estimated,
     /// In newtons.
     Known(f64),
     /// Unidentifiable force.
-    Untold,
+    Unknown,
 }
 
 /// Critical values for one contact at a point.
@@ -37,16 +37,16 @@ pub(in crate::influence) struct Limits {
 #[derive(Debug)]
 pub(in crate::influence) struct Inversion<E> {
     reading: E,
-    looks: Vec<Look>,
+    bounds: Vec<CellBound>,
     minima: Vec<Minimum>,
 }
 
-impl<E: Explain> Inversion<E> {
+impl<E: ContactLikelihood> Inversion<E> {
     pub fn new(mut reading: E) -> Self {
-        let mut looks = Vec::with_capacity(reading.cells().len());
-        reading.scan(&mut looks);
-        let minima = minima(&mut reading, &looks);
-        Self { reading, looks, minima }
+        let mut bounds = Vec::with_capacity(reading.cells().len());
+        reading.scan(&mut bounds);
+        let minima = minima(&mut reading, &bounds);
+        Self { reading, bounds, minima }
     }
 
     pub fn misfit(&self) -> f64 {
@@ -65,7 +65,7 @@ impl<E: Explain> Inversion<E> {
     }
 
     /// Returns the most probable mode with the posterior's uncertainty; `outside_model` beyond the limits.
-    pub fn estimate(mut self, told: ToldForce, limits: Limits) -> Estimate {
+    pub fn estimate(mut self, told: ForceKnowledge, limits: Limits) -> Estimate {
         let axes = self.reading.axes();
         let nowhere = Estimate::of_position(middle(axes), Status::OutsideModel);
         if self.minima.is_empty() {
@@ -101,7 +101,7 @@ impl<E: Explain> Inversion<E> {
             return None;
         }
         let mut posterior = Posterior::default();
-        for Weighed { place, weight, found } in quadrature::around(reading, &best)? {
+        for WeightedPlace { place, weight, found } in quadrature::around(reading, &best)? {
             posterior.all.add(weight, contact_at(place, &found, reading), true);
         }
         posterior.modes = vec![posterior.all];
@@ -110,10 +110,10 @@ impl<E: Explain> Inversion<E> {
 
     /// `None` where the sum is not a positive number.
     fn sum(&mut self) -> Option<Posterior> {
-        let Self { reading, looks, minima } = self;
+        let Self { reading, bounds, minima } = self;
         let axes = reading.axes();
         let modes = modes(reading, minima);
-        let others = candidates(reading, looks, minima);
+        let others = candidates(reading, bounds, minima);
         let mut posterior =
             Posterior { modes: vec![Probable::default(); minima.len()], ..Posterior::default() };
         let mut slices = [Slices::default(), Slices::default()];
@@ -151,9 +151,9 @@ impl<E: Explain> Inversion<E> {
 }
 
 #[cfg(test)]
-impl<E: Explain> Inversion<E> {
+impl<E: ContactLikelihood> Inversion<E> {
     /// Reference for tests, over the whole grid.
-    pub fn summed_everywhere(mut self, told: ToldForce, per_node: usize) -> ContactEstimate {
+    pub fn summed_everywhere(mut self, told: ForceKnowledge, per_node: usize) -> ContactEstimate {
         let axes = self.reading.axes();
         let count = |axis: Axis| ((axis.count - 1) * per_node).max(1);
         let at = |axis: Axis, i: usize| (i as f64 + 0.5) / count(axis) as f64 * (axis.count - 1) as f64;
@@ -161,7 +161,7 @@ impl<E: Explain> Inversion<E> {
         let mut all = Probable::default();
         for (i, j) in (0..count(axes[0])).flat_map(|i| (0..count(axes[1])).map(move |j| (i, j))) {
             let place = [at(axes[0], i), at(axes[1], j)];
-            let found = self.reading.explain(place, best.at[2]);
+            let found = self.reading.fit_place(place, best.at[2]);
             let weight = (0.5 * (best.found.cost - found.cost)).exp();
             if weight > 0.0 {
                 let is_usual = !is_margin(axes, place);
@@ -184,7 +184,7 @@ struct Posterior {
 impl Posterior {
     /// Most probable mode with the overall uncertainty: the mean of a multimodal posterior would lie outside
     /// all modes.
-    fn contact(&self, told: ToldForce) -> ContactEstimate {
+    fn contact(&self, told: ForceKnowledge) -> ContactEstimate {
         let all = self.all.contact(told);
         let mut contact = self.modes.first().map_or(all, |first| first.contact(told));
         contact.uncertainty = all.uncertainty;
@@ -199,7 +199,7 @@ impl Posterior {
 
 type ProbableContact = ([f64; 3], f64);
 
-fn contact_at<E: Explain>([x, y]: [f64; 2], found: &Explained, reading: &E) -> ProbableContact {
+fn contact_at<E: ContactLikelihood>([x, y]: [f64; 2], found: &PlaceFit, reading: &E) -> ProbableContact {
     let [x_axis, y_axis] = reading.axes();
     let (force_n, variance_n2) = reading.force(found.latent, found.latent_variance);
     ([x_axis.value(x), y_axis.value(y), force_n], variance_n2)
@@ -226,7 +226,7 @@ impl Probable {
         }
     }
 
-    fn contact(&self, told: ToldForce) -> ContactEstimate {
+    fn contact(&self, told: ForceKnowledge) -> ContactEstimate {
         /// With a smaller share outside the margins, the mean includes them.
         const LEAST_SHARE: f64 = 1e-6;
         let (mean, mut covariance) = self.everywhere.mean_and_covariance();
@@ -238,9 +238,9 @@ impl Probable {
         let squares = [dx * dx, dx * dy, dx * df, dy * dy, dy * df, df * df];
         covariance.iter_mut().zip(squares).for_each(|(value, square)| *value += square);
         let (force_n, covariance) = match told {
-            ToldForce::Estimated => (Some(force_n), covariance),
+            ForceKnowledge::Estimated => (Some(force_n), covariance),
             other => {
-                let force_n = if let ToldForce::Known(force_n) = other { Some(force_n) } else { None };
+                let force_n = if let ForceKnowledge::Known(force_n) = other { Some(force_n) } else { None };
                 (force_n, [covariance[0], covariance[1], 0.0, covariance[3], 0.0, 0.0])
             }
         };

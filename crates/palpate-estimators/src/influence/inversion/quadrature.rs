@@ -1,7 +1,7 @@
 //! Gauss–Hermite quadrature of a single, nearly normal mode: 5 points on a line, 3 × 3 on a plane.
 
 use super::minima::Minimum;
-use super::{Explain, Explained};
+use super::{ContactLikelihood, PlaceFit};
 use crate::influence::grid::Axis;
 use palpate_numerics::small::Ldl;
 
@@ -23,10 +23,10 @@ const THREE_POINTS: [(f64, f64); 3] =
     [(0.0, 2.0 / 3.0), (1.732_050_807_568_877_2, 1.0 / 6.0), (-1.732_050_807_568_877_2, 1.0 / 6.0)];
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Weighed {
+pub(super) struct WeightedPlace {
     pub place: [f64; 2],
     pub weight: f64,
-    pub found: Explained,
+    pub found: PlaceFit,
 }
 
 /// Returns weighted places that represent the posterior of a minimum; `None` where it is truncated or not
@@ -34,7 +34,7 @@ pub(super) struct Weighed {
 ///
 /// The first normal density is Laplace's approximation; further ones are fitted to the previous points.
 /// Without a sufficient fit, 25 points on a plane have to confirm the moments of 9.
-pub(super) fn around<E: Explain>(reading: &mut E, minimum: &Minimum) -> Option<Vec<Weighed>> {
+pub(super) fn around<E: ContactLikelihood>(reading: &mut E, minimum: &Minimum) -> Option<Vec<WeightedPlace>> {
     let axes = reading.axes();
     let varies = axes.map(|axis| axis.count > 1);
     let [x, y, latent] = minimum.at;
@@ -56,7 +56,7 @@ pub(super) fn around<E: Explain>(reading: &mut E, minimum: &Minimum) -> Option<V
             break points;
         }
         normal = normal.fitted(&points, varies)?;
-        middle = reading.explain(normal.mean, latent);
+        middle = reading.fit_place(normal.mean, latent);
     };
     if varies != [true; 2] {
         return None;
@@ -80,7 +80,7 @@ struct Point {
     at: [f64; 2],
     place: [f64; 2],
     weight: f64,
-    found: Explained,
+    found: PlaceFit,
     /// Rise of the cost minus that of the normal density.
     bend: f64,
 }
@@ -90,8 +90,8 @@ impl Point {
         square(self.at)
     }
 
-    fn weighed(&self) -> Weighed {
-        Weighed { place: self.place, weight: self.weight * (-0.5 * self.bend).exp(), found: self.found }
+    fn weighed(&self) -> WeightedPlace {
+        WeightedPlace { place: self.place, weight: self.weight * (-0.5 * self.bend).exp(), found: self.found }
     }
 }
 
@@ -144,16 +144,16 @@ impl Normal {
         [self.mean[0] + self.along * u, self.mean[1] + self.both * u + self.across * v]
     }
 
-    fn points<E: Explain>(
+    fn points<E: ContactLikelihood>(
         &self,
         reading: &mut E,
         latent: f64,
-        middle: Explained,
+        middle: PlaceFit,
         rule: impl Iterator<Item = ([f64; 2], f64)>,
     ) -> Vec<Point> {
         let point = |(at, weight): ([f64; 2], f64)| {
             let place = self.place(at);
-            let found = if at == [0.0; 2] { middle } else { reading.explain(place, latent) };
+            let found = if at == [0.0; 2] { middle } else { reading.fit_place(place, latent) };
             Point { at, place, weight, found, bend: found.cost - middle.cost - square(at) }
         };
         rule.map(point).collect()

@@ -1,8 +1,8 @@
 //! Integration of a posterior over tiles around its minima, from neighbour to neighbour.
 
-use super::cells::Look;
+use super::cells::CellBound;
 use super::minima::{Minimum, least_cost};
-use super::{Explain, Explained};
+use super::{ContactLikelihood, PlaceFit};
 
 /// A cost this far above the least has negligible probability: e⁻⁸.
 pub(super) const CUT: f64 = 16.0;
@@ -27,10 +27,14 @@ pub(super) struct Candidate {
     latent: f64,
 }
 
-pub(super) fn candidates<E: Explain>(reading: &E, looks: &[Look], minima: &[Minimum]) -> Vec<Vec<Candidate>> {
+pub(super) fn candidates<E: ContactLikelihood>(
+    reading: &E,
+    bounds: &[CellBound],
+    minima: &[Minimum],
+) -> Vec<Vec<Candidate>> {
     let cells = reading.cells();
     let mut candidates = vec![Vec::new(); minima.len()];
-    for (cell, look) in looks.iter().enumerate() {
+    for (cell, look) in bounds.iter().enumerate() {
         if least_cost(reading, cell, look) <= minima[0].found.cost + CUT {
             let place = cells.middle(cell).map(|node| node as f64);
             candidates[nearest(minima, place)].push(Candidate { place, latent: look.latent });
@@ -50,7 +54,7 @@ pub(super) struct Lattice {
 pub(super) struct Leaf {
     pub tile: [usize; 2],
     pub weight: f64,
-    pub found: Explained,
+    pub found: PlaceFit,
 }
 
 impl Lattice {
@@ -59,7 +63,7 @@ impl Lattice {
         Self { counts, steps: [0, 1].map(|k| (nodes[k] - 1) as f64 / counts[k] as f64) }
     }
 
-    fn fine_steps<E: Explain>(reading: &E, minimum: &Minimum) -> [f64; 2] {
+    fn fine_steps<E: ContactLikelihood>(reading: &E, minimum: &Minimum) -> [f64; 2] {
         let [x, y, latent] = minimum.at;
         let lengths = reading.lengths([x, y].map(|at| at.round() as usize), latent);
         let [[xx, _, xt], [_, yy, yt], [_, _, tt]] = minimum.information;
@@ -73,7 +77,7 @@ impl Lattice {
     }
 
     /// Covers the contributing places nearest to minimum `i`, with weights relative to the best minimum.
-    pub fn cover<E: Explain>(
+    pub fn cover<E: ContactLikelihood>(
         reading: &mut E,
         minima: &[Minimum],
         i: usize,
@@ -91,7 +95,7 @@ impl Lattice {
     }
 
     /// `None` beyond [`MOST_TILES`].
-    fn leaves<E: Explain>(
+    fn leaves<E: ContactLikelihood>(
         self,
         reading: &mut E,
         minima: &[Minimum],
@@ -112,7 +116,7 @@ impl Lattice {
         loop {
             while let Some((tile, latent)) = open.pop() {
                 let place = self.middle(tile);
-                let found = reading.explain(place, latent);
+                let found = reading.fit_place(place, latent);
                 // The tile of the minimum always counts.
                 let matters = found.cost <= best + CUT || tile == start;
                 if !matters || minima.len() > 1 && nearest(minima, place) != i {
@@ -139,7 +143,7 @@ impl Lattice {
                 if !std::mem::replace(&mut seen[seen_at(tile)], true) {
                     open.push((tile, *latent));
                 }
-            } else if reading.explain(*place, *latent).cost <= best + CUT {
+            } else if reading.fit_place(*place, *latent).cost <= best + CUT {
                 return None;
             }
         }

@@ -9,7 +9,8 @@ use crate::fit::{Locate, LocatorFault, NoCheck};
 use crate::force_prior::PriorTerms;
 use crate::influence::grid::{Axis, check_axes, greatest_distances, middle};
 use crate::influence::inversion::{
-    Cells, Explain, Explained, Inversion, Layers, Limits, Look, Slopes, Stencil, ToldForce, look_at_cells,
+    CellBound, Cells, ContactLikelihood, ForceKnowledge, Inversion, Layers, Limits, PlaceFit, Slopes,
+    Stencil, bound_cells,
 };
 use crate::influence::lanes::{LANES, Lanes, in_lanes};
 use crate::influence::levenberg::{EquationSums, Equations, Unknowns};
@@ -164,30 +165,30 @@ impl MeasuredLocator {
         per_node: usize,
     ) -> palpate_core::ContactEstimate {
         Inversion::new(self.seen(reading).expect("on its scale"))
-            .summed_everywhere(self.told_force(), per_node)
+            .summed_everywhere(self.force_knowledge(), per_node)
     }
 
     /// Returns whether estimates have a force.
-    pub fn tells_force(&self) -> bool {
-        self.told_force() != ToldForce::Untold
+    pub fn estimates_force(&self) -> bool {
+        self.force_knowledge() != ForceKnowledge::Unknown
     }
 
-    fn told_force(&self) -> ToldForce {
+    fn force_knowledge(&self) -> ForceKnowledge {
         match (self.stored.role, self.stored.force_n) {
-            (NuisanceRole::Force, _) => ToldForce::Estimated,
-            (_, Some(force_n)) => ToldForce::Known(force_n),
-            (_, None) => ToldForce::Untold,
+            (NuisanceRole::Force, _) => ForceKnowledge::Estimated,
+            (_, Some(force_n)) => ForceKnowledge::Known(force_n),
+            (_, None) => ForceKnowledge::Unknown,
         }
     }
 
     /// Whitened reading; `None` off its scale.
-    fn seen(&self, reading: &[f64]) -> Option<Seen<'_>> {
+    fn seen(&self, reading: &[f64]) -> Option<ReadingLikelihood<'_>> {
         let Stored { readings, whitening, .. } = &self.stored;
         let in_use = self.stored.channels_in_use().map(|channel| readings.scaled(reading[channel]));
         let scaled = in_use.collect::<Option<Vec<f64>>>()?;
         let mut whitened = vec![0.0; whitening.channels()];
         whitening.apply(&scaled, &mut whitened);
-        Some(Seen {
+        Some(ReadingLikelihood {
             locator: self,
             reading: in_lanes(&whitened),
             means: Vec::new(),
@@ -209,7 +210,7 @@ impl Locate for MeasuredLocator {
         match self.seen(reading) {
             Some(seen) => {
                 let limits = Limits { misfit: *residual_limit, spread: f64::INFINITY };
-                Inversion::new(seen).estimate(self.told_force(), limits)
+                Inversion::new(seen).estimate(self.force_knowledge(), limits)
             }
             None => Estimate::of_position(middle([table.x, table.y]), Status::OutsideModel),
         }
@@ -268,7 +269,7 @@ impl From<MeasuredLocator> for Stored {
 }
 
 #[derive(Debug)]
-struct Seen<'a> {
+struct ReadingLikelihood<'a> {
     locator: &'a MeasuredLocator,
     reading: Vec<Lanes>,
     means: Vec<Lanes>,
@@ -280,7 +281,7 @@ struct Seen<'a> {
     stretches: Vec<Stretch>,
 }
 
-impl Seen<'_> {
+impl ReadingLikelihood<'_> {
     /// Least squared residual and integral near a node; `None` where other parts of the line matter.
     fn explain_near(&mut self, place: [f64; 2], mut near: f64) -> Option<(f64, Marginal)> {
         let nodes = self.nodes();
@@ -323,7 +324,7 @@ impl Seen<'_> {
         }
         let line = Line { means: &self.parts, variances: &self.parts_variances };
         let (misfit, Marginal { weight, mean, variance }) =
-            line.explain(&self.reading, noise, &mut self.stretches);
+            line.fit_place(&self.reading, noise, &mut self.stretches);
         let scale = 1.0 / parts as f64;
         (misfit, Marginal { weight: weight * scale, mean: mean * scale, variance: variance * scale * scale })
     }
@@ -412,7 +413,7 @@ impl Kernel for LineEquations<'_> {
     }
 }
 
-impl Explain for Seen<'_> {
+impl ContactLikelihood for ReadingLikelihood<'_> {
     fn axes(&self) -> [Axis; 2] {
         let Table { x, y, .. } = &self.locator.stored.table;
         [*x, *y]
@@ -422,12 +423,12 @@ impl Explain for Seen<'_> {
         self.locator.search.cells
     }
 
-    fn scan(&self, looks: &mut Vec<Look>) {
-        look_at_cells(
+    fn scan(&self, bounds: &mut Vec<CellBound>) {
+        bound_cells(
             &self.locator.search.scan,
             &self.reading,
             self.locator.stored.whitening.channels(),
-            looks,
+            bounds,
         );
     }
 
@@ -468,13 +469,13 @@ impl Explain for Seen<'_> {
         0.0
     }
 
-    fn explain(&mut self, place: [f64; 2], latent: f64) -> Explained {
+    fn fit_place(&mut self, place: [f64; 2], latent: f64) -> PlaceFit {
         let nodes = self.nodes();
         self.interpolate_variances(place);
         let near = if nodes > 1 { self.explain_near(place, latent) } else { None };
         let (misfit, Marginal { weight, mean, variance }) = near.unwrap_or_else(|| self.explain_line(place));
         let [x, y] = self.axes();
-        Explained {
+        PlaceFit {
             misfit,
             cost: misfit - 2.0 * weight.ln() + x.margin_cost(place[0]) + y.margin_cost(place[1]),
             latent: if nodes > 1 { mean } else { 0.0 },

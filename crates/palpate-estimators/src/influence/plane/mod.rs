@@ -1,10 +1,10 @@
 //! Influence functions of a plane with a model, and their inversion.
 
 mod coarse;
+mod confidence_region;
 mod edges;
 mod likelihood;
 mod locator;
-mod not_excluded;
 mod posterior;
 mod search;
 mod table;

@@ -5,8 +5,8 @@
 //! smooth within each part, at the best force. For an unknown force, `not_excluded` then gives the intervals.
 
 use super::coarse::{MOST_VALLEYS, Profile};
-use super::not_excluded::Looked;
-use super::search::{Minimum, Profiled, Search};
+use super::confidence_region::PlaceProfile;
+use super::search::{ForceProfile, Minimum, Search};
 use crate::influence::config::ForceBelief;
 use crate::influence::levenberg::Unknowns;
 use crate::influence::moments::Moments;
@@ -39,7 +39,9 @@ pub(super) fn locate(search: &Search, reading: &[f64], scratch: &mut Scratch) ->
         matches!(surroundings.shape, Shape::Bent | Shape::Summed) && search.force == ForceBelief::Unknown;
     if let (true, Some(uncertainty)) = (is_traded_off, &mut estimate.contact.uncertainty) {
         let looked = scratch.leaves.iter().map(|leaf| leaf.looked);
-        search.not_excluded((&scratch.whitened, square), minima, looked, modes[0].mean).write(uncertainty);
+        search
+            .confidence_region((&scratch.whitened, square), minima, looked, modes[0].mean)
+            .write(uncertainty);
     }
     for mode in modes[1..].iter().filter(|mode| mode.weight >= OTHER_PLACE) {
         estimate.modes.push(palpate_core::Mode { contact: alone(mode), probability: mode.weight });
@@ -189,7 +191,7 @@ impl Search {
         if ends.as_flattened().iter().any(|there| (there.misfit - here.misfit - 4.0).abs() > MOST_BENT) {
             return Shape::Summed;
         }
-        let is_straight = |[ahead, behind]: &[Profiled; 2]| {
+        let is_straight = |[ahead, behind]: &[ForceProfile; 2]| {
             let bent_n = 0.5 * (ahead.force_n + behind.force_n) - here.force_n;
             bent_n.abs() <= MOST_BENT_FORCE * ff.sqrt()
         };
@@ -228,7 +230,7 @@ impl Search {
                     return false;
                 }
                 let there = self.profiled(whitened, block.middle_m);
-                let Profiled { force_n, misfit, .. } = there;
+                let ForceProfile { force_n, misfit, .. } = there;
                 let length = block.length_with(&there, self.greatest_force_n);
                 let spread = self.spread(block.middle_m);
                 if floor_within(misfit, length) + spread > most {
@@ -241,7 +243,7 @@ impl Search {
                     let [x_m, y_m] = block.middle_m;
                     leaves.push(Leaf {
                         weight: (0.5 * (best - misfit - spread)).exp() * area,
-                        looked: Looked {
+                        looked: PlaceProfile {
                             at: [x_m, y_m, force_n],
                             cost: misfit + spread,
                             steps: [0.5 * block.size_m[0], 0.5 * block.size_m[1], there.sd_n()],
@@ -333,7 +335,7 @@ fn growth(leaves: &mut [Leaf], about: [f64; 3], covariance: &[f64; 6]) -> f64 {
 struct Leaf {
     /// Unnormalized.
     weight: f64,
-    looked: Looked,
+    looked: PlaceProfile,
     mode: usize,
     /// Squared distance from the estimate, in standard deviations.
     distance: f64,
@@ -352,7 +354,7 @@ struct Block {
 
 impl Block {
     /// Lengths at the greatest force where that bound may be active.
-    fn length_with(&self, best: &Profiled, greatest_force_n: f64) -> [f64; 2] {
+    fn length_with(&self, best: &ForceProfile, greatest_force_n: f64) -> [f64; 2] {
         let is_near = best.force_n > HELD * greatest_force_n;
         // At the weakest place within, the greatest force then reads less than the best force in the middle.
         let reach = 0.5 * self.held_length[0].hypot(self.held_length[1]);

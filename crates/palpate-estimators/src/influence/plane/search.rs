@@ -49,7 +49,7 @@ pub(super) struct Minimum {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Profiled {
+pub(super) struct ForceProfile {
     pub force_n: f64,
     pub misfit: f64,
     /// Best force without bounds.
@@ -58,7 +58,7 @@ pub(super) struct Profiled {
     precision: f64,
 }
 
-impl Profiled {
+impl ForceProfile {
     pub fn sd_n(&self) -> f64 {
         self.precision.sqrt().recip()
     }
@@ -224,7 +224,7 @@ impl Search {
     }
 
     #[inline]
-    pub fn profiled(&self, whitened: &[f64], [x_m, y_m]: [f64; 2]) -> Profiled {
+    pub fn profiled(&self, whitened: &[f64], [x_m, y_m]: [f64; 2]) -> ForceProfile {
         let place = self.patches.place(x_m, y_m);
         let weights = self.nearest_groups(&self.weights, [x_m, y_m]);
         let mut sums = [[0.0; 8]; 3];
@@ -242,14 +242,14 @@ impl Search {
         let [square, product, norm] = sums.map(|lanes| lanes.iter().sum::<f64>());
         if let ForceBelief::Known(force_n) = self.force {
             let misfit = square + force_n * (force_n * norm - 2.0 * product);
-            return Profiled { force_n, misfit, free_n: force_n, precision: f64::INFINITY };
+            return ForceProfile { force_n, misfit, free_n: force_n, precision: f64::INFINITY };
         }
         let (mean, precision) = self.force.mean_and_precision();
         let (score, norm) = (product + mean * precision, norm + precision);
         let free_n = if norm > 0.0 { score / norm } else { 0.0 };
         let force_n = free_n.clamp(0.0, self.greatest_force_n);
         let misfit = square + mean * mean * precision + force_n * (force_n * norm - 2.0 * score);
-        Profiled { force_n, misfit, free_n, precision: norm }
+        ForceProfile { force_n, misfit, free_n, precision: norm }
     }
 
     /// Σ ln(1 + v), a term of −2·ln of the likelihood.

@@ -31,7 +31,7 @@ pub(crate) fn is_near_end(x_m: f64, sd_m: f64, length_m: f64) -> bool {
 
 /// Factor of q for learnt influences and noise: their errors are common to all channels and forces.
 ///
-/// Without it, the worst row of `trade_off/coverage.rs` has 90.7 % coverage.
+/// Without it, the worst row of `confidence_region/coverage.rs` has 90.7 % coverage.
 pub(crate) const CALIBRATED: f64 = 1.1;
 
 /// q of places behind a barrier of χ²: −2·ln 0.01, the likelihood ratio of other modes.
@@ -71,7 +71,7 @@ pub(crate) struct Contacts<'a> {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct NotExcluded {
+pub(crate) struct ConfidenceRegion {
     pub misfit: f64,
     pub x_95_m: (f64, f64),
     /// `None` for a known force.
@@ -92,7 +92,7 @@ pub(crate) struct Stretch {
     pub probability: f64,
 }
 
-impl NotExcluded {
+impl ConfidenceRegion {
     pub fn write(&self, estimate: &mut Estimate) {
         let Some((best, others)) = self.stretches.split_first() else { return };
         estimate.contact = best.contact_within(self.x_95_m, self.force_95_n);
@@ -165,7 +165,7 @@ impl Contacts<'_> {
     const WITHIN: usize = 24;
 
     /// Returns the confidence region, given local minima of χ²; `None` without a finite χ².
-    pub fn not_excluded(&self, minima_m: &[f64]) -> Option<NotExcluded> {
+    pub fn not_excluded(&self, minima_m: &[f64]) -> Option<ConfidenceRegion> {
         let mut buffer = Vec::new();
         let ends = self.end_readings(&mut buffer);
         let mut look = |x_m: f64| self.best(x_m, &ends, &mut buffer);
@@ -200,7 +200,7 @@ impl Contacts<'_> {
         let is_known = matches!(self.force, Force::Known(_));
         let x_95_m = around(|s| s.x_95_m)?;
         let force_95_n = if is_known { None } else { around(|s| s.force_95_n) };
-        Some(NotExcluded { misfit, x_95_m, force_95_n, stretches })
+        Some(ConfidenceRegion { misfit, x_95_m, force_95_n, stretches })
     }
 
     /// In rising order, with the places where the bound of the force becomes active.
@@ -252,14 +252,14 @@ impl Contacts<'_> {
         let way_m = last.x_m - first.x_m;
         let step = |i: usize| first.x_m + way_m * (i as f64 + 0.5) / Self::WITHIN as f64;
         let mut within: Vec<Best> = (0..Self::WITHIN).map(|i| look(step(i))).collect();
-        let weighed = Weighed::new(&within, region.least);
+        let moments = WeightedMoments::new(&within, region.least);
         let lowest = run.iter().copied().min_by(|a, b| a.cost().total_cmp(&b.cost())).unwrap_or(first);
-        let at = if weighed.weight > 0.0 && (reaches(&first, before) || reaches(&last, after)) {
-            look(first.x_m + way_m * weighed.median())
+        let at = if moments.weight > 0.0 && (reaches(&first, before) || reaches(&last, after)) {
+            look(first.x_m + way_m * moments.median())
         } else {
             lowest
         };
-        let covariance = weighed.covariance(&at, &within);
+        let covariance = moments.covariance(&at, &within);
         within.extend([first, last, lowest, at]);
         Stretch {
             x_95_m: (first.x_m, last.x_m),
@@ -267,7 +267,7 @@ impl Contacts<'_> {
             x_m: at.x_m,
             force_n: at.force_n,
             covariance,
-            probability: weighed.weight * way_m.max(f64::MIN_POSITIVE),
+            probability: moments.weight * way_m.max(f64::MIN_POSITIVE),
         }
     }
 
@@ -366,14 +366,14 @@ fn edge(
     good
 }
 
-struct Weighed {
+struct WeightedMoments {
     densities: Vec<f64>,
     /// Mean density.
     weight: f64,
     sum: f64,
 }
 
-impl Weighed {
+impl WeightedMoments {
     fn new(within: &[Best], least: f64) -> Self {
         let densities: Vec<f64> = within.iter().map(|at| (-0.5 * (at.cost() - least)).exp()).collect();
         let sum: f64 = densities.iter().sum();

@@ -15,7 +15,7 @@ use crate::distributed_contact::{BoundedContact, distributed_contact_bound, dist
 use crate::force_prior::{ForceIntegral, ForceLikelihood};
 use crate::influence::grid::Axis;
 use crate::influence::inversion::{
-    Cells, Explain, Explained, Inversion, Limits, Look, Slopes, ToldForce, look_at_cells,
+    CellBound, Cells, ContactLikelihood, ForceKnowledge, Inversion, Limits, PlaceFit, Slopes, bound_cells,
 };
 use crate::influence::lanes::{LANES, Lanes, in_lanes};
 use crate::influence::levenberg::{Equations, Unknowns};
@@ -25,8 +25,8 @@ use palpate_core::Estimate;
 use palpate_numerics::{SharedError, simd, with_shared_error};
 
 impl ForceLinearLocator {
-    pub(super) fn seen(&self, relative: &[f64]) -> Seen<'_> {
-        Seen {
+    pub(super) fn seen(&self, relative: &[f64]) -> ReadingLikelihood<'_> {
+        ReadingLikelihood {
             locator: self,
             reading: in_lanes(relative),
             noise: 1.0,
@@ -48,25 +48,25 @@ impl ForceLinearLocator {
         (self.stored.residual_limit, self.stored.spread_limit) = (misfit, Some(spread));
     }
 
-    fn told_force(&self) -> ToldForce {
-        self.stored.known_force_n.map_or(ToldForce::Estimated, ToldForce::Known)
+    fn force_knowledge(&self) -> ForceKnowledge {
+        self.stored.known_force_n.map_or(ForceKnowledge::Estimated, ForceKnowledge::Known)
     }
 
     pub(super) fn estimate(&self, relative: &[f64]) -> Estimate {
         let Stored { residual_limit, spread_limit, .. } = self.stored;
         let limits = Limits { misfit: residual_limit, spread: spread_limit.unwrap_or(f64::INFINITY) };
-        Inversion::new(self.seen(relative)).estimate(self.told_force(), limits)
+        Inversion::new(self.seen(relative)).estimate(self.force_knowledge(), limits)
     }
 
     /// Contact by summation over the grid.
     #[cfg(test)]
     pub fn summed_everywhere(&self, reading: &[f64], per_node: usize) -> palpate_core::ContactEstimate {
-        Inversion::new(self.seen(&self.relative(reading))).summed_everywhere(self.told_force(), per_node)
+        Inversion::new(self.seen(&self.relative(reading))).summed_everywhere(self.force_knowledge(), per_node)
     }
 }
 
 #[derive(Debug)]
-pub(super) struct Seen<'a> {
+pub(super) struct ReadingLikelihood<'a> {
     locator: &'a ForceLinearLocator,
     reading: Vec<Lanes>,
     /// Noise variance at the position over an untouched board's.
@@ -82,7 +82,7 @@ struct WeighChannels<'a, const SHARED: bool> {
     reading: &'a [Lanes],
     /// f, v and β.
     functions: [&'a [Lanes]; LAYERS],
-    open: &'a [Lanes],
+    offset_variance: &'a [Lanes],
     /// r and u.
     own: &'a [Lanes],
     shared: &'a [Lanes],
@@ -92,7 +92,7 @@ struct WeighChannels<'a, const SHARED: bool> {
 
 /// dᵀ·V⁻¹·d, fᵀ·V⁻¹·d, fᵀ·V⁻¹·f and ln|V|, over the noise.
 #[derive(Clone, Copy, Debug)]
-struct Weighed {
+struct WeightedSums {
     dd: f64,
     fd: f64,
     ff: f64,
@@ -100,14 +100,21 @@ struct Weighed {
 }
 
 impl<const SHARED: bool> simd::Kernel for WeighChannels<'_, SHARED> {
-    type Output = Weighed;
+    type Output = WeightedSums;
     const FUSED: bool = false;
 
     #[inline(always)] // Compiled for the instructions of its caller.
-    fn run<S: simd::Simd>(self) -> Weighed {
+    fn run<S: simd::Simd>(self) -> WeightedSums {
         const LARGE: f64 = 1e30;
-        let Self { reading, functions: [values, variances, covariances], open, own, shared, noise, force_n } =
-            self;
+        let Self {
+            reading,
+            functions: [values, variances, covariances],
+            offset_variance,
+            own,
+            shared,
+            noise,
+            force_n,
+        } = self;
         let mut sums = [[0.0; LANES]; 3];
         // Σ g·d/S, Σ g·f/S and Σ g²/S.
         let mut with_shared = [[0.0; LANES]; 3];
@@ -117,7 +124,7 @@ impl<const SHARED: bool> simd::Kernel for WeighChannels<'_, SHARED> {
             let (mut spreads, mut weights) = ([0.0; LANES], [0.0; LANES]);
             for l in 0..LANES {
                 let (v, beta) = (variances[g][l].max(0.0), covariances[g][l]);
-                spreads[l] = (open[g][l] + force_n * (2.0 * beta + force_n * v)).max(0.0);
+                spreads[l] = (offset_variance[g][l] + force_n * (2.0 * beta + force_n * v)).max(0.0);
                 let own = if SHARED { own[g][l] * spreads[l] } else { spreads[l] };
                 weights[l] = 1.0 / (noise + own);
                 let (d, f) = (reading[g][l], values[g][l]);
@@ -144,10 +151,10 @@ impl<const SHARED: bool> simd::Kernel for WeighChannels<'_, SHARED> {
         let [dd, fd, ff] = sums.map(|lanes| lanes.iter().sum());
         log_determinant += low.ln() + high.ln();
         if !SHARED {
-            return Weighed { dd, fd, ff, log_determinant };
+            return WeightedSums { dd, fd, ff, log_determinant };
         }
         let [gd, gf, gg] = with_shared.map(|lanes| lanes.iter().sum());
-        Weighed {
+        WeightedSums {
             dd: with_shared_error(dd, gd, gd, gg),
             fd: with_shared_error(fd, gd, gf, gg),
             ff: with_shared_error(ff, gf, gf, gg),
@@ -156,24 +163,26 @@ impl<const SHARED: bool> simd::Kernel for WeighChannels<'_, SHARED> {
     }
 }
 
-impl Seen<'_> {
-    fn weighed(&self, force_n: f64) -> Weighed {
-        let ForceLinearLocator { open, own, shared, layers, .. } = self.locator;
+impl ReadingLikelihood<'_> {
+    fn weighed(&self, force_n: f64) -> WeightedSums {
+        let ForceLinearLocator { offset_variance, own, shared, layers, .. } = self.locator;
         let of = |layer: usize| &self.between[layer * layers.groups()..(layer + 1) * layers.groups()];
         let functions = [of(VALUES), of(VARIANCES), of(COVARIANCES)];
         let noise = self.locator.noise() * self.noise;
         let reading = &self.reading;
         let weighed = if shared.is_empty() {
-            let channels = WeighChannels::<false> { reading, functions, open, own, shared, noise, force_n };
+            let channels =
+                WeighChannels::<false> { reading, functions, offset_variance, own, shared, noise, force_n };
             simd::run_loops(channels)
         } else {
-            let channels = WeighChannels::<true> { reading, functions, open, own, shared, noise, force_n };
+            let channels =
+                WeighChannels::<true> { reading, functions, offset_variance, own, shared, noise, force_n };
             simd::run_loops(channels)
         };
         // `log_determinant` is relative to the local noise.
         let of_place = self.locator.stored.live.len() as f64 * self.noise.ln();
         let share = self.locator.stored.channels_as_one.recip();
-        Weighed {
+        WeightedSums {
             dd: share * weighed.dd,
             fd: share * weighed.fd,
             ff: share * weighed.ff,
@@ -211,7 +220,7 @@ impl Seen<'_> {
     }
 }
 
-impl Explain for Seen<'_> {
+impl ContactLikelihood for ReadingLikelihood<'_> {
     fn axes(&self) -> [Axis; 2] {
         self.locator.axes()
     }
@@ -220,11 +229,11 @@ impl Explain for Seen<'_> {
         Cells::new(self.axes().map(|axis| axis.count), 1)
     }
 
-    fn scan(&self, looks: &mut Vec<Look>) {
+    fn scan(&self, bounds: &mut Vec<CellBound>) {
         let live = self.locator.stored.live.len();
         match &self.locator.scan {
-            CellScan::Bounded(scan) => look_at_cells(scan, &self.reading, live, looks),
-            CellScan::Broad(scan) => look_at_cells(scan, &self.reading, live, looks),
+            CellScan::Bounded(scan) => bound_cells(scan, &self.reading, live, bounds),
+            CellScan::Broad(scan) => bound_cells(scan, &self.reading, live, bounds),
         }
     }
 
@@ -244,14 +253,14 @@ impl Explain for Seen<'_> {
     }
 
     fn weigh(&mut self, [x, y, response_n]: Unknowns) {
-        let ForceLinearLocator { layers, open, own, shared, .. } = self.locator;
+        let ForceLinearLocator { layers, offset_variance, own, shared, .. } = self.locator;
         layers.interpolate([x, y], VARIANCES..LAYERS, &mut self.between);
         let noise = self.locator.noise() * self.locator.noise_at([x, y]);
         let as_one = self.locator.stored.channels_as_one;
         let (variances, covariances) = self.between.split_at(self.reading.len());
         let spread = |g: usize, l: usize| {
             let v = variances[g][l].max(0.0);
-            (open[g][l] + response_n * (2.0 * covariances[g][l] + response_n * v)).max(0.0)
+            (offset_variance[g][l] + response_n * (2.0 * covariances[g][l] + response_n * v)).max(0.0)
         };
         let weight = |g: usize, l: usize| 1.0 / (as_one * (noise + own[g][l] * spread(g, l)));
         let error = |g: usize, l: usize| shared[g][l] * (as_one * spread(g, l)).sqrt();
@@ -301,7 +310,7 @@ impl Explain for Seen<'_> {
     }
 
     /// φ by steps from `latent`, each with the last one's variances.
-    fn explain(&mut self, place: [f64; 2], latent: f64) -> Explained {
+    fn fit_place(&mut self, place: [f64; 2], latent: f64) -> PlaceFit {
         /// Two steps leave less than a thousandth.
         const STEPS: usize = 2;
         let [x, y] = self.axes();
@@ -309,9 +318,9 @@ impl Explain for Seen<'_> {
         self.locator.layers.interpolate(place, 0..LAYERS, &mut self.between);
         self.noise = self.locator.noise_at(place);
         if self.range().is_none() {
-            let Weighed { dd, fd, ff, log_determinant } = self.weighed(latent);
+            let WeightedSums { dd, fd, ff, log_determinant } = self.weighed(latent);
             let misfit = (dd + latent * (latent * ff - 2.0 * fd)).max(0.0);
-            return Explained {
+            return PlaceFit {
                 misfit,
                 cost: misfit + log_determinant + margin,
                 latent,
@@ -320,14 +329,14 @@ impl Explain for Seen<'_> {
         }
         let prior = &self.locator.force_prior;
         let response_n = (0..STEPS).fold(latent, |response_n, _| {
-            let Weighed { fd, ff, .. } = self.weighed(response_n);
+            let WeightedSums { fd, ff, .. } = self.weighed(response_n);
             prior.estimate_n(fd, ff)
         });
-        let Weighed { dd, fd, ff, log_determinant } = self.weighed(response_n);
+        let WeightedSums { dd, fd, ff, log_determinant } = self.weighed(response_n);
         let misfit = (dd + response_n * (response_n * ff - 2.0 * fd)).max(0.0);
         let likelihood = ForceLikelihood { b: fd, a: ff, at_n: response_n, misfit };
         let ForceIntegral { peak_cost, width_cost, mean_n, variance_n2 } = prior.integrate(likelihood);
-        Explained {
+        PlaceFit {
             misfit,
             cost: peak_cost + log_determinant + width_cost + margin,
             latent: mean_n,

@@ -4,8 +4,8 @@
 //! likelihood) at most q above the least; q falls from 3.84 to 2.71 towards the edges that bound the value.
 
 use super::search::{Minimum, Search};
+use crate::confidence_region::{CALIBRATED, likelihood_bound};
 use crate::influence::levenberg::{Unknowns, descend};
-use crate::trade_off::{CALIBRATED, likelihood_bound};
 use palpate_core::Uncertainty;
 use palpate_numerics::chi_squared_critical_value;
 use std::sync::OnceLock;
@@ -29,9 +29,9 @@ const ROUNDS: usize = 12;
 const FORCE: usize = 2;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct NotExcluded([(f64, f64); 3]);
+pub(super) struct ConfidenceIntervals([(f64, f64); 3]);
 
-impl NotExcluded {
+impl ConfidenceIntervals {
     pub fn write(&self, uncertainty: &mut Uncertainty) {
         let Self([x_95_m, y_95_m, force_95_n]) = *self;
         *uncertainty = Uncertainty { x_95_m, y_95_m, force_95_n: Some(force_95_n), ..*uncertainty };
@@ -40,7 +40,7 @@ impl NotExcluded {
 
 /// Evaluated place with the best force.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Looked {
+pub(super) struct PlaceProfile {
     /// x, y and force.
     pub at: Unknowns,
     /// −2·ln of the likelihood, less a constant.
@@ -58,7 +58,7 @@ struct Way {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Found {
+struct BoundaryPoint {
     at: Unknowns,
     /// √(cost − least) − √q; positive where excluded.
     beyond: [f64; 3],
@@ -66,24 +66,24 @@ struct Found {
 
 impl Search {
     /// Returns intervals that contain `estimate`; `square` is |d|², `minima` are sorted.
-    pub fn not_excluded(
+    pub fn confidence_region(
         &self,
         (whitened, square): (&[f64], f64),
         minima: &[Minimum],
-        looked: impl Iterator<Item = Looked>,
+        looked: impl Iterator<Item = PlaceProfile>,
         estimate: Unknowns,
-    ) -> NotExcluded {
+    ) -> ConfidenceIntervals {
         let limits = [self.size_m[0], self.size_m[1], self.greatest_force_n];
         if self.rule.net_reduction(square, minima[0].misfit) <= faint() {
-            return NotExcluded(limits.map(|limit| (0.0, limit)));
+            return ConfidenceIntervals(limits.map(|limit| (0.0, limit)));
         }
-        let looked: Vec<Looked> =
+        let looked: Vec<PlaceProfile> =
             looked.chain(minima.iter().map(|minimum| self.looked_at(whitened, minimum))).collect();
         let least = looked.iter().map(|looked| looked.cost).fold(f64::INFINITY, f64::min);
         let reading = Reading { search: self, whitened, least };
         // q far from all edges.
         let most_above = CALIBRATED * likelihood_bound(f64::INFINITY);
-        let likely: Vec<(Found, [f64; 3])> = looked
+        let likely: Vec<(BoundaryPoint, [f64; 3])> = looked
             .iter()
             .filter(|looked| looked.cost - least <= most_above)
             .map(|looked| (reading.found(looked.at, looked.cost), looked.steps))
@@ -92,16 +92,16 @@ impl Search {
             let way = Way { unknown, side, limit: if side < 0.0 { 0.0 } else { limits[unknown] } };
             reading.end(way, &likely).unwrap_or(estimate[unknown])
         };
-        NotExcluded(std::array::from_fn(|k| {
+        ConfidenceIntervals(std::array::from_fn(|k| {
             (end(k, -1.0).min(estimate[k]), end(k, 1.0).max(estimate[k]).min(limits[k]))
         }))
     }
 
-    fn looked_at(&self, whitened: &[f64], minimum: &Minimum) -> Looked {
+    fn looked_at(&self, whitened: &[f64], minimum: &Minimum) -> PlaceProfile {
         let [x_m, y_m, _] = minimum.at;
         let best = self.profiled(whitened, [x_m, y_m]);
         let [along_m, across_m] = self.coarse.cell_m.map(|cell_m| 0.125 * cell_m);
-        Looked {
+        PlaceProfile {
             at: [x_m, y_m, best.force_n],
             cost: best.misfit + self.spread([x_m, y_m]),
             steps: [along_m, across_m, best.sd_n()],
@@ -116,16 +116,16 @@ struct Reading<'a> {
 }
 
 impl Reading<'_> {
-    fn found(&self, at: Unknowns, cost: f64) -> Found {
+    fn found(&self, at: Unknowns, cost: f64) -> BoundaryPoint {
         let root = (cost - self.least).max(0.0).sqrt();
         let [along, across] = self.search.edges.distances(at);
         let distances = [along, across, along.min(across)];
         let beyond = distances.map(|distance| root - (CALIBRATED * likelihood_bound(distance)).sqrt());
-        Found { at, beyond }
+        BoundaryPoint { at, beyond }
     }
 
     /// Contact with the other unknowns profiled.
-    fn held(&self, unknown: usize, value: f64, from: &Found) -> Found {
+    fn held(&self, unknown: usize, value: f64, from: &BoundaryPoint) -> BoundaryPoint {
         let Self { search, whitened, .. } = *self;
         let mut start = from.at;
         start[unknown] = value;
@@ -145,10 +145,10 @@ impl Reading<'_> {
     }
 
     /// Last included value; `None` where no likely contact is included.
-    fn end(&self, way: Way, likely: &[(Found, [f64; 3])]) -> Option<f64> {
+    fn end(&self, way: Way, likely: &[(BoundaryPoint, [f64; 3])]) -> Option<f64> {
         let Way { unknown, side, limit } = way;
-        let is_inside = |found: &Found| found.beyond[unknown] <= 0.0;
-        let reach = |(found, steps): &(Found, [f64; 3])| {
+        let is_inside = |found: &BoundaryPoint| found.beyond[unknown] <= 0.0;
+        let reach = |(found, steps): &(BoundaryPoint, [f64; 3])| {
             side * found.at[unknown] - found.beyond[unknown] * steps[unknown]
         };
         let farthest =
@@ -170,7 +170,7 @@ impl Reading<'_> {
     }
 
     /// Last included value, by the Illinois method (Dowell and Jarratt, BIT 11, 1971).
-    fn between(&self, unknown: usize, mut inside: Found, mut outside: Found) -> f64 {
+    fn between(&self, unknown: usize, mut inside: BoundaryPoint, mut outside: BoundaryPoint) -> f64 {
         let (mut stayed, mut weights) = (None, [1.0, 1.0]);
         for _ in 0..ROUNDS {
             let beyond = [&inside, &outside].map(|found| found.beyond[unknown]);
