@@ -1,6 +1,6 @@
 //! Inversion of readings over a grid of places on a surface without a model.
 //!
-//! [`Explain`] models how a reading depends on the place and on one latent number: a nuisance coordinate, a
+//! [`ContactLikelihood`] models how a reading depends on the place and on one latent number: a nuisance coordinate, a
 //! response to the force, or a gain. All structures share [`Cells`], [`minima`] and [`posterior`].
 
 mod cells;
