@@ -44,3 +44,17 @@ export function textWithin(ctx: CanvasRenderingContext2D, text: string, px: numb
   ctx.textAlign = "center";
   ctx.fillText(text, Math.min(Math.max(px, half), Math.max(half, width - half)), y);
 }
+
+/** Writes a text above a pixel, within the canvas, with a halo that covers what is behind it. */
+export function labelAbove(ctx: CanvasRenderingContext2D, text: string, px: number, y: number, colour: string, halo: string): void {
+  const half = ctx.measureText(text).width / 2 + 4;
+  const [left, bottom] = [Math.min(Math.max(px, half), ctx.canvas.clientWidth - half), Math.max(y, 14)];
+  ctx.textAlign = "center";
+  ctx.textBaseline = "bottom";
+  ctx.strokeStyle = halo;
+  ctx.lineWidth = 5;
+  ctx.lineJoin = "round";
+  ctx.strokeText(text, left, bottom);
+  ctx.fillStyle = colour;
+  ctx.fillText(text, left, bottom);
+}

@@ -5,7 +5,7 @@ import { linear, roundUp, ticks } from "../model/scale";
 import { naturalSpline } from "../model/spline";
 import type { Snapshot } from "../model/snapshot";
 import { isPlaced, number } from "../words";
-import { disc, segment, textWithin, type Frame } from "./canvas";
+import { disc, labelAbove, segment, textWithin, type Frame } from "./canvas";
 import { palette } from "./palette";
 import { drawTargets } from "./targets";
 
@@ -163,7 +163,7 @@ function drawSensors(ctx: CanvasRenderingContext2D, shown: Snapshot, x: (mm: num
 function drawNext(ctx: CanvasRenderingContext2D, next: PlaceRecord, x: (mm: number) => number, level: number): void {
   const px = x(next.x_mm);
   drawArrow(ctx, px, level - 16, 36);
-  label(ctx, `${next.x_mm.toFixed(1)} mm`, px, level - 56, palette().ink);
+  labelAbove(ctx, `${next.x_mm.toFixed(1)} mm`, px, level - 56, palette().ink, palette().card);
 }
 
 function drawContact({ ctx, height }: Frame, shown: Snapshot, x: (mm: number) => number, level: number, shape: (px: number) => number): void {
@@ -187,7 +187,7 @@ function drawContact({ ctx, height }: Frame, shown: Snapshot, x: (mm: number) =>
     disc(ctx, px, level + shape(px) - 9, 7);
     ctx.stroke();
     ctx.setLineDash([]);
-    label(ctx, `${Math.round(100 * mode.probability)} %`, px, level + shape(px) - 22, ink);
+    labelAbove(ctx, `${Math.round(100 * mode.probability)} %`, px, level + shape(px) - 22, ink, card);
   }
   [...(sample.further ?? []), sample].forEach((one) => {
     const main = one === sample;
@@ -203,7 +203,7 @@ function drawContact({ ctx, height }: Frame, shown: Snapshot, x: (mm: number) =>
     ctx.fill();
     ctx.stroke();
     const force = one.force_n === undefined ? "" : `  ${number(one.force_n, one.sd_force_n)} N`;
-    label(ctx, `${number(one.x_mm, one.sd_mm)} mm${force}`, px, y - (main ? 44 : 34), ink);
+    labelAbove(ctx, `${number(one.x_mm, one.sd_mm)} mm${force}`, px, y - (main ? 44 : 34), ink, card);
   });
 }
 
@@ -239,12 +239,4 @@ function drawArrow(ctx: CanvasRenderingContext2D, px: number, y: number, length:
   ctx.lineTo(px - 5, y - 9);
   ctx.lineTo(px + 5, y - 9);
   ctx.fill();
-}
-
-function label(ctx: CanvasRenderingContext2D, text: string, px: number, y: number, colour: string): void {
-  const half = ctx.measureText(text).width / 2 + 3;
-  ctx.fillStyle = colour;
-  ctx.textAlign = "center";
-  ctx.textBaseline = "bottom";
-  ctx.fillText(text, Math.min(Math.max(px, half), ctx.canvas.clientWidth - half), Math.max(y, 14));
 }

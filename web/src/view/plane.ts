@@ -5,7 +5,7 @@ import { ofCovariance, ofIntervals, RADIUS_95, type Ellipse } from "../model/ell
 import { fit, linear, ticks } from "../model/scale";
 import type { Snapshot } from "../model/snapshot";
 import { isPlaced, number } from "../words";
-import { disc, segment, textWithin, widest, type Frame } from "./canvas";
+import { disc, labelAbove, segment, textWithin, widest, type Frame } from "./canvas";
 import { palette } from "./palette";
 import { drawTargets } from "./targets";
 
@@ -136,11 +136,7 @@ function drawContact(ctx: CanvasRenderingContext2D, one: ContactRecord, place: P
   }
   ctx.stroke();
   ctx.setLineDash([]);
-  const half = ctx.measureText(words).width / 2 + 4;
-  ctx.fillStyle = ink;
-  ctx.textAlign = "center";
-  ctx.textBaseline = "bottom";
-  ctx.fillText(words, Math.min(Math.max(px, half), ctx.canvas.clientWidth - half), Math.max(py - 10, 14));
+  labelAbove(ctx, words, px, py - 10, ink, card);
 }
 
 /** Ellipse of the covariance, or of the intervals if there is none or if force and position trade off. */
