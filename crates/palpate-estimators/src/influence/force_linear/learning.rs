@@ -26,7 +26,6 @@ use crate::setup::Setup;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::regression::Kernel;
 use palpate_numerics::watch::{Cancelled, Watch};
-use palpate_numerics::{bisect, mean};
 use std::sync::Arc;
 
 /// Most presses of the hyperparameter search.
@@ -34,8 +33,6 @@ pub(crate) const MOST_SEARCHED: usize = 150;
 /// Most presses of a fit, with time cubic in their number; more are condensed.
 pub(crate) const MOST_PRESSES: usize = 1000;
 const LEAST_TO_JUDGE: usize = 6;
-/// With fewer positions, the hyperparameters' uncertainty determines the errors.
-const LEAST_TO_WIDEN: usize = 19;
 /// Every fifth position is held out.
 pub(crate) const FOLDS: usize = 5;
 
@@ -54,8 +51,6 @@ pub(super) struct InfluenceModel {
     lengths_m: Vec<f64>,
     average: Average,
     sources: SourceGrid,
-    /// Variance factor of the process.
-    widening: f64,
     pub set_aside: Vec<usize>,
 }
 
@@ -190,7 +185,7 @@ impl InfluenceModel {
         }
         let lengths_m = scored[0].found.prior.lengths_m.clone();
         let best = scored.into_iter().max_by(|a, b| a.score.total_cmp(&b.score));
-        let Some(ScoredFit { found: StructureFit { prior, fits, sensors_m }, widening, .. }) = best else {
+        let Some(ScoredFit { found: StructureFit { prior, fits, sensors_m }, .. }) = best else {
             return Ok(None);
         };
         let set_aside = set_aside.to_vec();
@@ -205,7 +200,6 @@ impl InfluenceModel {
             lengths_m,
             average: Average::default(),
             sources: SourceGrid::new(extent),
-            widening,
             set_aside,
         }))
     }
@@ -218,17 +212,15 @@ impl InfluenceModel {
     pub fn functions(&self, places_m: &[Vec<f64>], watch: Watch) -> Result<Vec<Functions>, MeasuredError> {
         let mut functions = self.average.functions(&self.presses, &self.sources.places_m, places_m, watch)?;
         let per_newton = 1.0 / self.prior.force_scale_n;
-        let widening = self.widening * dependence(&self.prior, &self.presses);
         if let Some(drift) = &self.drift {
             for (functions, variance) in functions.iter_mut().zip(drift.variances_at_the_end()?) {
                 functions.offset_variance += variance;
             }
         }
         for functions in &mut functions {
-            functions.offset_variance *= widening;
             functions.values.iter_mut().for_each(|value| *value *= per_newton);
-            functions.variances.iter_mut().for_each(|v| *v *= widening * per_newton * per_newton);
-            functions.covariances.iter_mut().for_each(|c| *c *= widening * per_newton);
+            functions.variances.iter_mut().for_each(|v| *v *= per_newton * per_newton);
+            functions.covariances.iter_mut().for_each(|c| *c *= per_newton);
         }
         Ok(functions)
     }
@@ -312,16 +304,6 @@ fn no_functions(structure: Structure, presses: usize) -> Result<Option<Influence
     if structure == Structure::Auto { Ok(None) } else { Err(MeasuredError::TooFewPresses { presses }) }
 }
 
-/// Variance factor for correlated errors of the channels.
-///
-/// Wrong positions or forces make all channels scatter with force; half of this is assumed to shift the
-/// position.
-fn dependence(prior: &Prior, presses: &CalibrationRows) -> f64 {
-    const MOVES_POSITION: f64 = 0.5;
-    let scattered = mean(presses.force_n.iter().map(|force_n| 1.0 - 1.0 / prior.scatter_of(*force_n)));
-    1.0 + scattered * (MOVES_POSITION * presses.centre.len() as f64 - 1.0).max(0.0)
-}
-
 struct StructureFit {
     prior: Prior,
     fits: Vec<ChannelFit>,
@@ -331,7 +313,6 @@ struct StructureFit {
 struct ScoredFit {
     found: StructureFit,
     score: f64,
-    widening: f64,
 }
 
 impl ScoredFit {
@@ -346,21 +327,8 @@ impl ScoredFit {
             -0.5 * (variance.ln() + square / variance)
         };
         let score = errors.iter().map(score).sum();
-        let is_judged = presses.positions_m().len() >= LEAST_TO_WIDEN;
-        let widening = if is_judged { widening(&errors) } else { 1.0 };
-        Ok(Self { found, score, widening })
+        Ok(Self { found, score })
     }
-}
-
-/// Factor of the process's variance that makes squared errors as large as their variances.
-fn widening(errors: &[[f64; 3]]) -> f64 {
-    const MOST: f64 = 25.0;
-    let too_small = |widening: f64| {
-        let standardized =
-            errors.iter().map(|[square, noise, process]| square / (noise + widening * process));
-        standardized.sum::<f64>() > errors.len() as f64
-    };
-    bisect((1.0, MOST), 30, too_small)
 }
 
 /// Presses held out and the others, by [`FOLDS`] positions; empty with few positions.
@@ -483,7 +451,9 @@ impl Search<'_> {
             // Scatter that grows with force resembles influences that change with force.
             let scatters = SCATTERS.map(|scatter| Prior { scatter, ..prior.clone() });
             let (scattered, _) = self.best_of(scatters, &[])?;
-            if found > best.max(scattered) + LEAST_GAIN * dependence(&prior, self.presses) {
+            // Errors of forces and positions are common to all channels, and count once a channel.
+            let repeated = if prior.scatter > 0.0 { self.presses.centre.len() } else { 1 };
+            if found > best.max(scattered) + LEAST_GAIN * repeated as f64 {
                 prior = nonlinear;
             }
         }
