@@ -165,7 +165,7 @@ impl Contacts<'_> {
     const WITHIN: usize = 24;
 
     /// Returns the confidence region, given local minima of χ²; `None` without a finite χ².
-    pub fn not_excluded(&self, minima_m: &[f64]) -> Option<ConfidenceRegion> {
+    pub fn confidence_region(&self, minima_m: &[f64]) -> Option<ConfidenceRegion> {
         let mut buffer = Vec::new();
         let ends = self.end_readings(&mut buffer);
         let mut look = |x_m: f64| self.best(x_m, &ends, &mut buffer);
@@ -489,7 +489,7 @@ mod tests {
             extrapolates: false,
             channels: &channels,
         };
-        let found = contacts.not_excluded(&[0.3]).unwrap();
+        let found = contacts.confidence_region(&[0.3]).unwrap();
         let [stretch] = found.stretches[..] else { panic!("{found:?}") };
         assert!((found.x_95_m.0 - 0.01).abs() < 1e-4 && found.x_95_m.1 == 1.0, "{found:?}");
         let (least_n, most_n) = found.force_95_n.unwrap();
@@ -500,7 +500,7 @@ mod tests {
     #[test]
     fn one_channel_may_be_anything_beyond_the_presses_where_the_others_tell_the_place() {
         // Sensors that read powers of the place, at a known force of 1 N at 0.5 m.
-        let not_excluded = |channels: i32, wrong: f64| {
+        let confidence_region = |channels: i32, wrong: f64| {
             let channels = move |x_m: f64, _: f64, out: &mut Vec<[f64; 2]>| {
                 out.clear();
                 let reads = |k: i32, x_m: f64| 1e3 * f64::from(k + 1) * x_m.powi(k + 1);
@@ -516,10 +516,10 @@ mod tests {
                 extrapolates: true,
                 channels: &channels,
             };
-            contacts.not_excluded(&[0.5]).unwrap().x_95_m
+            contacts.confidence_region(&[0.5]).unwrap().x_95_m
         };
         for (channels, wrong) in [(3, 0.0), (3, 50.0), (2, 0.0), (1, 0.0)] {
-            let (low_m, high_m) = not_excluded(channels, wrong);
+            let (low_m, high_m) = confidence_region(channels, wrong);
             assert!(low_m <= 0.5 && 0.5 <= high_m && high_m - low_m < 0.1, "{channels}: {low_m} to {high_m}");
         }
     }

@@ -401,7 +401,7 @@ impl Posterior<'_> {
             channels: &channels,
         };
         let minima_m: Vec<f64> = found.iter().map(|at| at.position_m).collect();
-        let open = contacts.not_excluded(&minima_m)?;
+        let open = contacts.confidence_region(&minima_m)?;
         let mut estimate = Estimate::of_position(Position::default(), Status::Located);
         open.write(&mut estimate);
         if found[0].to_m - found[0].from_m > 0.01 * self.length_m() {

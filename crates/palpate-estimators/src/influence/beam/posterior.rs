@@ -75,7 +75,7 @@ fn write_uncertain(
     let is_roughly_known = matches!(search.force, ForceBelief::Normal { .. });
     let is_bounded = |minimum: &Minimum| is_near(minimum) || is_too_hard(search, minimum);
     let trades_off = !is_roughly_known && minima.iter().any(is_bounded);
-    let misfit = match trades_off.then(|| not_excluded(search, read.whitened, minima)).flatten() {
+    let misfit = match trades_off.then(|| confidence_region(search, read.whitened, minima)).flatten() {
         Some(found) => {
             found.write(estimate);
             found.misfit
@@ -91,7 +91,7 @@ fn write_uncertain(
     }
 }
 
-fn not_excluded(search: &Search, whitened: &[[f64; 8]], minima: &[Minimum]) -> Option<ConfidenceRegion> {
+fn confidence_region(search: &Search, whitened: &[[f64; 8]], minima: &[Minimum]) -> Option<ConfidenceRegion> {
     let (table, gauss_newton) = (&search.table, &search.gauss_newton);
     let channels = |x_m: f64, force_n: f64, channels: &mut Vec<[f64; 2]>| {
         let cell = table.cell(x_m);
@@ -119,7 +119,7 @@ fn not_excluded(search: &Search, whitened: &[[f64; 8]], minima: &[Minimum]) -> O
         channels: &channels,
     };
     let minima_m: Vec<f64> = minima.iter().map(|minimum| minimum.x_m).collect();
-    contacts.not_excluded(&minima_m)
+    contacts.confidence_region(&minima_m)
 }
 
 fn write_competing(search: &Search, minima: &[Minimum], misfits: &[f64; COARSE], estimate: &mut Estimate) {

@@ -59,7 +59,7 @@ impl ForceLinearLocator {
             return;
         }
         let minima_m: Vec<f64> = contacts.iter().map(|contact| contact.position.x_m - axis.start).collect();
-        let Some(found) = self.not_excluded(axis, relative, &minima_m) else { return };
+        let Some(found) = self.confidence_region(axis, relative, &minima_m) else { return };
         let (x_95_m, force_95_n) = self.on_surface(axis, &found);
         let ContactEstimate { position, force_n, uncertainty: Some(uncertainty) } = &mut estimate.contact
         else {
@@ -72,7 +72,7 @@ impl ForceLinearLocator {
         }
     }
 
-    fn not_excluded(&self, axis: Axis, relative: &[f64], minima_m: &[f64]) -> Option<ConfidenceRegion> {
+    fn confidence_region(&self, axis: Axis, relative: &[f64], minima_m: &[f64]) -> Option<ConfidenceRegion> {
         let seen = RefCell::new(self.seen(relative));
         let channels = |along_m: f64, response_n: f64, channels: &mut Vec<[f64; 2]>| {
             seen.borrow_mut().whiten([along_m / axis.step, 0.0, response_n], channels)
@@ -86,7 +86,7 @@ impl ForceLinearLocator {
             extrapolates: self.stored.channels_as_one == 1.0,
             channels: &channels,
         };
-        contacts.not_excluded(minima_m)
+        contacts.confidence_region(minima_m)
     }
 
     /// Coordinate k of the outermost positions; the grid's ends in files without them.

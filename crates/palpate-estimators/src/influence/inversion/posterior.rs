@@ -65,14 +65,14 @@ impl<E: ContactLikelihood> Inversion<E> {
     }
 
     /// Returns the most probable mode with the posterior's uncertainty; `outside_model` beyond the limits.
-    pub fn estimate(mut self, told: ForceKnowledge, limits: Limits) -> Estimate {
+    pub fn estimate(mut self, force: ForceKnowledge, limits: Limits) -> Estimate {
         let axes = self.reading.axes();
         let nowhere = Estimate::of_position(middle(axes), Status::OutsideModel);
         if self.minima.is_empty() {
             return nowhere;
         }
         let Some(posterior) = self.quadrature().or_else(|| self.sum()) else { return nowhere };
-        let contact = posterior.contact(told);
+        let contact = posterior.contact(force);
         if !self.is_explained(limits) {
             return Estimate::of_contact(contact, Status::OutsideModel);
         }
@@ -84,7 +84,7 @@ impl<E: ContactLikelihood> Inversion<E> {
         estimate.modes = BoundedList::none(Mode::default());
         for mode in others {
             let probability = mode.everywhere.weight / posterior.all.everywhere.weight;
-            if !estimate.modes.push(Mode { contact: mode.contact(told), probability }) {
+            if !estimate.modes.push(Mode { contact: mode.contact(force), probability }) {
                 break;
             }
         }
@@ -153,7 +153,7 @@ impl<E: ContactLikelihood> Inversion<E> {
 #[cfg(test)]
 impl<E: ContactLikelihood> Inversion<E> {
     /// Reference for tests, over the whole grid.
-    pub fn summed_everywhere(mut self, told: ForceKnowledge, per_node: usize) -> ContactEstimate {
+    pub fn summed_everywhere(mut self, force: ForceKnowledge, per_node: usize) -> ContactEstimate {
         let axes = self.reading.axes();
         let count = |axis: Axis| ((axis.count - 1) * per_node).max(1);
         let at = |axis: Axis, i: usize| (i as f64 + 0.5) / count(axis) as f64 * (axis.count - 1) as f64;
@@ -168,7 +168,7 @@ impl<E: ContactLikelihood> Inversion<E> {
                 all.add(weight, contact_at(place, &found, &self.reading), is_usual);
             }
         }
-        all.contact(told)
+        all.contact(force)
     }
 }
 
@@ -184,9 +184,9 @@ struct Posterior {
 impl Posterior {
     /// Most probable mode with the overall uncertainty: the mean of a multimodal posterior would lie outside
     /// all modes.
-    fn contact(&self, told: ForceKnowledge) -> ContactEstimate {
-        let all = self.all.contact(told);
-        let mut contact = self.modes.first().map_or(all, |first| first.contact(told));
+    fn contact(&self, force: ForceKnowledge) -> ContactEstimate {
+        let all = self.all.contact(force);
+        let mut contact = self.modes.first().map_or(all, |first| first.contact(force));
         contact.uncertainty = all.uncertainty;
         if let Some(uncertainty) = &mut contact.uncertainty {
             let [x_95_m, y_95_m] = self.intervals_m.unwrap_or([uncertainty.x_95_m, uncertainty.y_95_m]);
@@ -226,7 +226,7 @@ impl Probable {
         }
     }
 
-    fn contact(&self, told: ForceKnowledge) -> ContactEstimate {
+    fn contact(&self, force: ForceKnowledge) -> ContactEstimate {
         /// With a smaller share outside the margins, the mean includes them.
         const LEAST_SHARE: f64 = 1e-6;
         let (mean, mut covariance) = self.everywhere.mean_and_covariance();
@@ -237,7 +237,7 @@ impl Probable {
         let [x_m, y_m, force_n] = std::array::from_fn(|k| origin[k] + found[k]);
         let squares = [dx * dx, dx * dy, dx * df, dy * dy, dy * df, df * df];
         covariance.iter_mut().zip(squares).for_each(|(value, square)| *value += square);
-        let (force_n, covariance) = match told {
+        let (force_n, covariance) = match force {
             ForceKnowledge::Estimated => (Some(force_n), covariance),
             other => {
                 let force_n = if let ForceKnowledge::Known(force_n) = other { Some(force_n) } else { None };

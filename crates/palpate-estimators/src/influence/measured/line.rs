@@ -59,7 +59,7 @@ pub(super) struct Stretch {
 
 impl Line<'_> {
     /// Least squared residual, and the integral relative to it.
-    pub fn fit_place(
+    pub fn marginal(
         self,
         reading: &[Lanes],
         noise: &WhiteNoise,

@@ -324,7 +324,7 @@ impl ReadingLikelihood<'_> {
         }
         let line = Line { means: &self.parts, variances: &self.parts_variances };
         let (misfit, Marginal { weight, mean, variance }) =
-            line.fit_place(&self.reading, noise, &mut self.stretches);
+            line.marginal(&self.reading, noise, &mut self.stretches);
         let scale = 1.0 / parts as f64;
         (misfit, Marginal { weight: weight * scale, mean: mean * scale, variance: variance * scale * scale })
     }
