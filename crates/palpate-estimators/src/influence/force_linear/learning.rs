@@ -24,6 +24,7 @@ use crate::influence::measured::MeasuredError;
 use crate::recording::Recording;
 use crate::setup::Setup;
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::bisect;
 use palpate_numerics::regression::Kernel;
 use palpate_numerics::watch::{Cancelled, Watch};
 use std::sync::Arc;
@@ -33,6 +34,8 @@ pub(crate) const MOST_SEARCHED: usize = 150;
 /// Most presses of a fit, with time cubic in their number; more are condensed.
 pub(crate) const MOST_PRESSES: usize = 1000;
 const LEAST_TO_JUDGE: usize = 6;
+/// With fewer positions, the hyperparameters' uncertainty determines the errors.
+const LEAST_TO_WIDEN: usize = 19;
 /// Every fifth position is held out.
 pub(crate) const FOLDS: usize = 5;
 
@@ -51,6 +54,8 @@ pub(super) struct InfluenceModel {
     lengths_m: Vec<f64>,
     average: Average,
     sources: SourceGrid,
+    /// Variance factor of the process.
+    widening: f64,
     pub set_aside: Vec<usize>,
 }
 
@@ -185,7 +190,7 @@ impl InfluenceModel {
         }
         let lengths_m = scored[0].found.prior.lengths_m.clone();
         let best = scored.into_iter().max_by(|a, b| a.score.total_cmp(&b.score));
-        let Some(ScoredFit { found: StructureFit { prior, fits, sensors_m }, .. }) = best else {
+        let Some(ScoredFit { found: StructureFit { prior, fits, sensors_m }, widening, .. }) = best else {
             return Ok(None);
         };
         let set_aside = set_aside.to_vec();
@@ -200,6 +205,7 @@ impl InfluenceModel {
             lengths_m,
             average: Average::default(),
             sources: SourceGrid::new(extent),
+            widening,
             set_aside,
         }))
     }
@@ -218,9 +224,10 @@ impl InfluenceModel {
             }
         }
         for functions in &mut functions {
+            functions.offset_variance *= self.widening;
             functions.values.iter_mut().for_each(|value| *value *= per_newton);
-            functions.variances.iter_mut().for_each(|v| *v *= per_newton * per_newton);
-            functions.covariances.iter_mut().for_each(|c| *c *= per_newton);
+            functions.variances.iter_mut().for_each(|v| *v *= self.widening * per_newton * per_newton);
+            functions.covariances.iter_mut().for_each(|c| *c *= self.widening * per_newton);
         }
         Ok(functions)
     }
@@ -313,6 +320,7 @@ struct StructureFit {
 struct ScoredFit {
     found: StructureFit,
     score: f64,
+    widening: f64,
 }
 
 impl ScoredFit {
@@ -327,8 +335,21 @@ impl ScoredFit {
             -0.5 * (variance.ln() + square / variance)
         };
         let score = errors.iter().map(score).sum();
-        Ok(Self { found, score })
+        let is_judged = presses.positions_m().len() >= LEAST_TO_WIDEN;
+        let widening = if is_judged { widening(&errors) } else { 1.0 };
+        Ok(Self { found, score, widening })
     }
+}
+
+/// Factor of the process's variance that makes squared errors as large as their variances.
+fn widening(errors: &[[f64; 3]]) -> f64 {
+    const MOST: f64 = 25.0;
+    let too_small = |widening: f64| {
+        let standardized =
+            errors.iter().map(|[square, noise, process]| square / (noise + widening * process));
+        standardized.sum::<f64>() > errors.len() as f64
+    };
+    bisect((1.0, MOST), 30, too_small)
 }
 
 /// Presses held out and the others, by [`FOLDS`] positions; empty with few positions.
