@@ -153,7 +153,7 @@ impl Region {
         at.bound.max(self.floor) - (at.misfit + at.spread.min(self.most_spread) - self.least)
     }
 
-    fn holds(&self, at: &Best) -> bool {
+    fn contains(&self, at: &Best) -> bool {
         self.left(at) >= 0.0
     }
 }
@@ -168,28 +168,28 @@ impl Contacts<'_> {
     pub fn confidence_region(&self, minima_m: &[f64]) -> Option<ConfidenceRegion> {
         let mut buffer = Vec::new();
         let ends = self.end_readings(&mut buffer);
-        let mut look = |x_m: f64| self.best(x_m, &ends, &mut buffer);
-        let looked = self.look_over(minima_m, &mut look);
-        let misfit = looked.iter().map(|at| at.misfit).fold(f64::INFINITY, f64::min);
+        let mut profile_at = |x_m: f64| self.best(x_m, &ends, &mut buffer);
+        let profile = self.profile_places(minima_m, &mut profile_at);
+        let misfit = profile.iter().map(|at| at.misfit).fold(f64::INFINITY, f64::min);
         if !misfit.is_finite() {
             return None;
         }
-        let in_numbers = looked.iter().filter(|at| !at.cost().is_nan());
+        let in_numbers = profile.iter().filter(|at| !at.cost().is_nan());
         let best = in_numbers.min_by(|a, b| a.cost().total_cmp(&b.cost()))?;
         let most_spread = if self.extrapolates { best.spread } else { f64::INFINITY };
         let region = Region { least: best.cost(), most_spread, floor: 0.0 };
         let mut stretches = Vec::new();
         let mut from = 0;
-        let around_best = self.around_best(&looked, &region);
-        while from < looked.len() {
+        let around_best = self.around_best(&profile, &region);
+        while from < profile.len() {
             let floor = if around_best.contains(&from) { 0.0 } else { self.widening * BEYOND_A_BARRIER };
             let region = Region { floor, ..region };
-            let run_len = looked[from..].iter().take_while(|at| region.holds(at)).count();
+            let run_len = profile[from..].iter().take_while(|at| region.contains(at)).count();
             if run_len > 0 {
                 let beside = [from.checked_sub(1), Some(from + run_len)];
-                let beside = beside.map(|i| i.and_then(|i| looked.get(i).copied()));
-                let run = &looked[from..from + run_len];
-                stretches.push(self.stretch(run, beside, &region, &mut look));
+                let beside = beside.map(|i| i.and_then(|i| profile.get(i).copied()));
+                let run = &profile[from..from + run_len];
+                stretches.push(self.stretch(run, beside, &region, &mut profile_at));
             }
             from += run_len.max(1);
         }
@@ -204,7 +204,7 @@ impl Contacts<'_> {
     }
 
     /// In rising order, with the places where the bound of the force becomes active.
-    fn look_over(&self, minima_m: &[f64], look: &mut impl FnMut(f64) -> Best) -> Vec<Best> {
+    fn profile_places(&self, minima_m: &[f64], profile_at: &mut impl FnMut(f64) -> Best) -> Vec<Best> {
         let h_m = self.length_m / Self::CELLS as f64;
         let halved = (1..=Self::HALVINGS).map(|k| h_m * 0.5f64.powi(k));
         let mut places: Vec<f64> = (0..=Self::CELLS).map(|i| i as f64 * h_m).collect();
@@ -212,26 +212,26 @@ impl Contacts<'_> {
         places.extend(halved.map(|x_m| self.length_m - x_m));
         places.extend(minima_m.iter().map(|x_m| x_m.clamp(0.0, self.length_m)));
         places.sort_by(f64::total_cmp);
-        let mut looked: Vec<Best> = places.into_iter().map(&mut *look).collect();
-        let at_bound: Vec<Best> = looked
+        let mut profile: Vec<Best> = places.into_iter().map(&mut *profile_at).collect();
+        let at_bound: Vec<Best> = profile
             .windows(2)
             .filter(|pair| pair[0].is_held != pair[1].is_held)
             .map(|pair| {
-                edge(&pair[0], &pair[1], Self::EDGE_HALVINGS, look, |at| at.is_held == pair[0].is_held)
+                edge(&pair[0], &pair[1], Self::EDGE_HALVINGS, profile_at, |at| at.is_held == pair[0].is_held)
             })
             .collect();
-        looked.extend(at_bound);
-        looked.sort_by(|a, b| a.x_m.total_cmp(&b.x_m));
-        looked
+        profile.extend(at_bound);
+        profile.sort_by(|a, b| a.x_m.total_cmp(&b.x_m));
+        profile
     }
 
     /// Places around the best, up to barriers.
-    fn around_best(&self, looked: &[Best], region: &Region) -> std::ops::Range<usize> {
+    fn around_best(&self, profile: &[Best], region: &Region) -> std::ops::Range<usize> {
         let barrier = Region { floor: self.widening * BEYOND_A_BARRIER, ..*region };
-        let is_barrier = |at: &Best| !barrier.holds(at);
-        let best = looked.iter().position(|at| at.cost() == region.least).unwrap_or(0);
-        let from = looked[..best].iter().rposition(is_barrier).map_or(0, |i| i + 1);
-        let to = looked[best..].iter().position(is_barrier).map_or(looked.len(), |i| best + i);
+        let is_barrier = |at: &Best| !barrier.contains(at);
+        let best = profile.iter().position(|at| at.cost() == region.least).unwrap_or(0);
+        let from = profile[..best].iter().rposition(is_barrier).map_or(0, |i| i + 1);
+        let to = profile[best..].iter().position(is_barrier).map_or(profile.len(), |i| best + i);
         from..to
     }
 
@@ -240,22 +240,24 @@ impl Contacts<'_> {
         run: &[Best],
         [before, after]: [Option<Best>; 2],
         region: &Region,
-        look: &mut impl FnMut(f64) -> Best,
+        profile_at: &mut impl FnMut(f64) -> Best,
     ) -> Stretch {
         let mut end = |inside: &Best, outside: Option<Best>| match outside {
             None => *inside,
-            Some(outside) => edge(inside, &outside, Self::EDGE_HALVINGS, look, |at| region.holds(at)),
+            Some(outside) => {
+                edge(inside, &outside, Self::EDGE_HALVINGS, profile_at, |at| region.contains(at))
+            }
         };
         let (first, last) = (end(&run[0], before), end(&run[run.len() - 1], after));
         // The bound of the force counts as the end of the line.
         let reaches = |edge: &Best, outside: Option<Best>| outside.is_none_or(|o| o.is_held) || edge.is_held;
         let way_m = last.x_m - first.x_m;
         let step = |i: usize| first.x_m + way_m * (i as f64 + 0.5) / Self::WITHIN as f64;
-        let mut within: Vec<Best> = (0..Self::WITHIN).map(|i| look(step(i))).collect();
+        let mut within: Vec<Best> = (0..Self::WITHIN).map(|i| profile_at(step(i))).collect();
         let moments = WeightedMoments::new(&within, region.least);
         let lowest = run.iter().copied().min_by(|a, b| a.cost().total_cmp(&b.cost())).unwrap_or(first);
         let at = if moments.weight > 0.0 && (reaches(&first, before) || reaches(&last, after)) {
-            look(first.x_m + way_m * moments.median())
+            profile_at(first.x_m + way_m * moments.median())
         } else {
             lowest
         };
@@ -351,13 +353,13 @@ fn edge(
     inside: &Best,
     outside: &Best,
     halvings: usize,
-    look: &mut impl FnMut(f64) -> Best,
-    holds: impl Fn(&Best) -> bool,
+    profile_at: &mut impl FnMut(f64) -> Best,
+    contains: impl Fn(&Best) -> bool,
 ) -> Best {
     let (mut good, mut bad_m) = (*inside, outside.x_m);
     for _ in 0..halvings {
-        let middle = look(0.5 * (good.x_m + bad_m));
-        if holds(&middle) {
+        let middle = profile_at(0.5 * (good.x_m + bad_m));
+        if contains(&middle) {
             good = middle;
         } else {
             bad_m = middle.x_m;
@@ -413,13 +415,13 @@ pub(crate) fn interval_on_line_95(x_m: f64, sd_m: f64, length_m: f64) -> (f64, f
     }
     let held_m = x_m.clamp(0.0, length_m);
     let misfit = |at_m: f64| ((at_m - x_m) / sd_m).powi(2);
-    let holds =
+    let contains =
         |at_m: f64| misfit(at_m) - misfit(held_m) <= likelihood_bound(at_m.min(length_m - at_m) / sd_m);
     let edge = |end_m: f64| {
         let way_m = end_m - held_m;
-        held_m + way_m * bisect((0.0, 1.0), 50, |share| holds(held_m + share * way_m))
+        held_m + way_m * bisect((0.0, 1.0), 50, |share| contains(held_m + share * way_m))
     };
-    let to = |end_m: f64| if holds(end_m) { end_m } else { edge(end_m) };
+    let to = |end_m: f64| if contains(end_m) { end_m } else { edge(end_m) };
     (to(0.0), to(length_m))
 }
 

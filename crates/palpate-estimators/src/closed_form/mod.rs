@@ -401,14 +401,14 @@ impl Posterior<'_> {
             channels: &channels,
         };
         let minima_m: Vec<f64> = found.iter().map(|at| at.position_m).collect();
-        let open = contacts.confidence_region(&minima_m)?;
+        let region = contacts.confidence_region(&minima_m)?;
         let mut estimate = Estimate::of_position(Position::default(), Status::Located);
-        open.write(&mut estimate);
+        region.write(&mut estimate);
         if found[0].to_m - found[0].from_m > 0.01 * self.length_m() {
             estimate.status = Status::Ambiguous;
         }
         let is_pull = estimate.contact.force_n.is_none_or(|force_n| force_n <= 0.0);
-        if is_pull || !rule.is_explained(open.misfit) || self.is_distributed(found) {
+        if is_pull || !rule.is_explained(region.misfit) || self.is_distributed(found) {
             estimate.status = Status::OutsideModel;
         }
         Some(estimate)

@@ -102,7 +102,7 @@ fn disturbances(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     if linear.noise_is_hardly_told() {
         lines.push(noise_is_hardly_told(linear.presses()));
     }
-    if !linear.tells_untouched() {
+    if !linear.identifies_untouched() {
         lines.push(
             "the offsets are undetermined by about the size of contact readings: no reading is `no_contact` unless some rows are recorded untouched (force 0)"
                 .to_owned(),

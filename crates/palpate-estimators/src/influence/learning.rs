@@ -131,13 +131,13 @@ impl<'a> Learning<'a> {
         let all: Vec<usize> = (0..pressed.len()).collect();
         let few = rows_of_search(rows);
         let searched: Vec<SensorRows> = priors.iter().zip(living).map(|sensor| with(sensor, &few)).collect();
-        let noise_is_told = living.iter().all(|s| noise_variance(rows, layout, *s).is_some());
+        let noise_is_measured = living.iter().all(|s| noise_variance(rows, layout, *s).is_some());
         // Rows of one force confound offset and influence of a reaction: no support makes it 0 everywhere.
         let touched = rows.touched();
         let has_one_force = is_one_force(touched.iter().map(|row| rows.force_n[*row]));
         let offset_is_open = has_one_force && touched.len() == rows.len();
         let is_reaction_alone = mean == Mean::Zero && kind == SensorKind::Reaction && offset_is_open;
-        let identifiable = Identifiability { noise: noise_is_told, offset: is_reaction_alone };
+        let identifiable = Identifiability { noise: noise_is_measured, offset: is_reaction_alone };
         let mut hyper = most_probable(&searched, mean, surface.length_m(), identifiable, watch)?;
         if source == InfluenceSource::Mechanics {
             hyper = Hyperparameters { noise: hyper.noise, ..Hyperparameters::NONE };

@@ -69,9 +69,9 @@ impl UntouchedRows {
 
     pub fn offset_at(&self, time: f64) -> RowOffset {
         let after = self.untouched.partition_point(|mean| mean.time <= time);
-        let of_rest = |rest: &UntouchedMean| RowOffset {
-            values: rest.mean.clone(),
-            relative_variance: rest.count.recip(),
+        let of_rest = |mean: &UntouchedMean| RowOffset {
+            values: mean.mean.clone(),
+            relative_variance: mean.count.recip(),
         };
         match (after.checked_sub(1).and_then(|i| self.untouched.get(i)), self.untouched.get(after)) {
             (None, None) => RowOffset { values: self.mean.clone(), relative_variance: self.count.recip() },

@@ -236,8 +236,8 @@ fn locate_eight<V: EightLanes>(
     for i in 0..8 {
         if floors[i] > minima[i].misfit + NEGLIGIBLE {
             let whitened = &whitened[i * groups..][..groups];
-            let read = WhitenedReading { whitened, square: squares[i] };
-            conclude(search, read, &minima[i..=i], &profiles[i], &mut estimates[i]);
+            let reading = WhitenedReading { whitened, square: squares[i] };
+            conclude(search, reading, &minima[i..=i], &profiles[i], &mut estimates[i]);
         } else {
             hard |= 1 << i;
         }
@@ -273,8 +273,8 @@ fn locate_into<V: EightLanes>(
 ) {
     let square = search.whiten::<V>(reading, scratch.whitened.room(search.groups()));
     let (minima, count) = search.minima::<V>(square, scratch);
-    let read = WhitenedReading { whitened: scratch.whitened.groups(search.groups()), square };
-    conclude(search, read, &minima[..count], &scratch.profile, estimate);
+    let reading = WhitenedReading { whitened: scratch.whitened.groups(search.groups()), square };
+    conclude(search, reading, &minima[..count], &scratch.profile, estimate);
 }
 
 impl Stored {

@@ -22,7 +22,7 @@ pub(super) struct WhitenedReading<'a> {
 #[inline(always)]
 pub(super) fn conclude(
     search: &Search,
-    read: WhitenedReading,
+    reading: WhitenedReading,
     minima: &[Minimum],
     profile: &Profile,
     estimate: &mut Estimate,
@@ -30,7 +30,7 @@ pub(super) fn conclude(
     let best = &minima[0];
     estimate.modes.clear();
     estimate.further.clear();
-    if search.rule.is_no_contact(read.square, best.misfit) {
+    if search.rule.is_no_contact(reading.square, best.misfit) {
         estimate.contact =
             ContactEstimate { position: Position::along(best.x_m), ..ContactEstimate::default() };
         estimate.status = Status::NoContact;
@@ -47,11 +47,11 @@ pub(super) fn conclude(
     if minima.len() == 1 && clear && narrow {
         estimate.contact = contact(search, best, normal_interval_95(best.x_m, sd_m));
         estimate.status = Status::Located;
-        if !search.is_explained(read.whitened, best) {
+        if !search.is_explained(reading.whitened, best) {
             estimate.status = Status::OutsideModel;
         }
     } else {
-        write_uncertain(search, read, minima, profile, estimate);
+        write_uncertain(search, reading, minima, profile, estimate);
     }
 }
 
@@ -65,7 +65,7 @@ fn is_too_hard(search: &Search, minimum: &Minimum) -> bool {
 #[cold]
 fn write_uncertain(
     search: &Search,
-    read: WhitenedReading,
+    reading: WhitenedReading,
     minima: &[Minimum],
     profile: &Profile,
     estimate: &mut Estimate,
@@ -75,7 +75,7 @@ fn write_uncertain(
     let is_roughly_known = matches!(search.force, ForceBelief::Normal { .. });
     let is_bounded = |minimum: &Minimum| is_near(minimum) || is_too_hard(search, minimum);
     let trades_off = !is_roughly_known && minima.iter().any(is_bounded);
-    let misfit = match trades_off.then(|| confidence_region(search, read.whitened, minima)).flatten() {
+    let misfit = match trades_off.then(|| confidence_region(search, reading.whitened, minima)).flatten() {
         Some(found) => {
             found.write(estimate);
             found.misfit
@@ -85,7 +85,7 @@ fn write_uncertain(
             minima[0].misfit
         }
     };
-    let is_point = minima.iter().any(|minimum| !search.is_spread(read.whitened, minimum));
+    let is_point = minima.iter().any(|minimum| !search.is_spread(reading.whitened, minimum));
     if !search.rule.is_explained(misfit) || !is_point {
         estimate.status = Status::OutsideModel;
     }

@@ -73,9 +73,9 @@ impl ForceLinearLocator {
     }
 
     fn confidence_region(&self, axis: Axis, relative: &[f64], minima_m: &[f64]) -> Option<ConfidenceRegion> {
-        let seen = RefCell::new(self.seen(relative));
+        let likelihood = RefCell::new(self.likelihood(relative));
         let channels = |along_m: f64, response_n: f64, channels: &mut Vec<[f64; 2]>| {
-            seen.borrow_mut().whiten([along_m / axis.step, 0.0, response_n], channels)
+            likelihood.borrow_mut().whiten([along_m / axis.step, 0.0, response_n], channels)
         };
         let contacts = Contacts {
             length_m: length_m(axis),
@@ -121,8 +121,8 @@ impl ForceLinearLocator {
         if found.force_95_n.is_none() {
             return (if is_beyond_grid { whole_m } else { (low_m, high_m) }, None);
         }
-        let told = probable().map(|stretch| stretch.force_95_n).reduce(hull);
-        let (least_n, most_n) = told.filter(|_| !is_before && !is_behind).unwrap_or((0.0, hardest_n));
+        let force_95_n = probable().map(|stretch| stretch.force_95_n).reduce(hull);
+        let (least_n, most_n) = force_95_n.filter(|_| !is_before && !is_behind).unwrap_or((0.0, hardest_n));
         let force_n = |response_n: f64| prior.force_of_response(response_n, 0.0).0;
         ((low_m, high_m), Some((force_n(least_n), force_n(most_n))))
     }

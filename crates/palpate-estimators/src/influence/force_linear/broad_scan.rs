@@ -125,7 +125,7 @@ impl CellBlocks for BroadScan {
     }
 
     #[inline(always)]
-    fn bounds<V: EightLanes>(&self, block: usize, reading: &[f64]) -> [V; 3] {
+    fn fits<V: EightLanes>(&self, block: usize, reading: &[f64]) -> [V; 3] {
         let (_, greatest_n) = self.prior.ends_n();
         let (zero, greatest) = (V::splat(0.0), V::splat(greatest_n));
         let by_noise = self.sums(block, reading, zero).response(greatest);

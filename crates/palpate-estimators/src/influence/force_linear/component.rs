@@ -39,7 +39,7 @@ impl Component {
         let units = signal_variances(presses);
         let mut log_densities = Array3::from_elem((channels, noises.len(), ratios.len()), f64::NEG_INFINITY);
         let mut of_places = Array2::from_elem((channels, sensors_m.len()), f64::NEG_INFINITY);
-        // ρ has a log-uniform prior.
+        // ρ has a log-uniform prior, and each value stands for a step.
         let log_step = ratios.windows(2).map(|pair| (pair[1] / pair[0]).log10()).fold(1.0, f64::min).ln();
         // Cells that are not evaluated have no probability.
         let evaluated = if sensors_m.is_empty() { 0.0 } else { (sensors_m.len() as f64 / grid.cells).ln() };
@@ -59,7 +59,7 @@ impl Component {
                 let Some(widest) = densities.iter().max_by(|a, b| a.scale().total_cmp(&b.scale())) else {
                     continue;
                 };
-                let residues = evidence.residues(&restricted, *ratio, (c, square), of_sources);
+                let residues = evidence.residues(*ratio, (c, square), of_sources);
                 let residues = ChannelResidues::new(residues, *ratio, widest);
                 // Readings in units of their standard deviation, so that flat priors of coefficients compare.
                 let scale = log_step + evaluated - 0.5 * log_determinant
@@ -141,14 +141,13 @@ struct ChannelResidues {
 impl ChannelResidues {
     /// Residues at the ratio ρ; `widest` has the largest noise, which distinguishes residues least.
     fn new(found: impl Iterator<Item = Residue>, ratio: f64, widest: &ResidueDensity) -> Self {
-        /// Density over that of the least square.
-        const NEGLIGIBLE: f64 = 1e-14;
         let mut all: Vec<Residue> = found.collect();
         all.iter_mut().for_each(|residue| residue.square *= ratio);
         let least = all.iter().min_by(|a, b| a.square.total_cmp(&b.square));
         let (least_square, least_weight) = least.map_or((0.0, 1.0), |least| (least.square, least.weight));
+        // A sum that contains the least square's density rounds smaller ones away.
         let is_probable = |residue: &&Residue| {
-            residue.weight * widest.relative(residue.square, least_square) >= NEGLIGIBLE * least_weight
+            residue.weight * widest.relative(residue.square, least_square) >= f64::EPSILON * least_weight
         };
         let kept = || all.iter().filter(is_probable);
         Self {

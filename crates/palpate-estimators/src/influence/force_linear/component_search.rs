@@ -157,8 +157,9 @@ impl ComponentSearch<'_> {
         if is_fine && divided.is_none() {
             return Ok(Some(component));
         }
-        let log = |r: usize| 2 * component.ratios[r].log10().round() as i32;
-        let halves = (log(low) - 1..=log(high) + 1).map(|half| 10f64.powf(0.5 * f64::from(half)));
+        // Middles of the halves of each decade.
+        let halves_of = |ratio: &f64| [-0.25, 0.25].map(|half| ratio * 10f64.powf(half));
+        let halves = component.ratios[low..=high].iter().flat_map(halves_of);
         let ratios = if is_fine { component.ratios.clone() } else { halves.collect() };
         self.of_ratios(component.prior, divided.as_ref().unwrap_or(self.sources), ratios)
     }

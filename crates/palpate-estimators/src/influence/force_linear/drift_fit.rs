@@ -34,10 +34,10 @@ impl CalibrationRows {
         for _ in 0..ROUNDS {
             let estimate = Estimate::new(few, prior, fits)?;
             let presses = self.condensed_in_time(prior, &estimate, most, watch)?;
-            let told = DriftFit { prior: prior.clone(), fits: fits.to_vec(), presses };
-            let still = told.taken_off(self)?;
+            let fit = DriftFit { prior: prior.clone(), fits: fits.to_vec(), presses };
+            let still = fit.taken_off(self)?;
             few = still.condensed(prior, fits, most, watch)?;
-            drift = Some(told);
+            drift = Some(fit);
         }
         Ok((few, drift.expect("there is a round")))
     }

@@ -317,7 +317,8 @@ impl<'a> Evidence<'a> {
         white: &ArrayView1<f64>,
         (sources, products): (&WhiteSources, &ArrayView1<f64>),
     ) -> ChannelFit {
-        let fit = |Residue { square, log_determinant, source, .. }: Residue| {
+        let log_determinant = self.log_determinant(restricted, ratio);
+        let fit = |Residue { square, log_weight, source, .. }: Residue| {
             let (log_density, signal) = match self.densities.get(c) {
                 Some(density) => density.of_residue(square, ratio),
                 None => {
@@ -325,9 +326,9 @@ impl<'a> Evidence<'a> {
                     (-0.5 * self.freedom() * signal.ln(), signal)
                 }
             };
-            (log_density - 0.5 * log_determinant, signal, source)
+            (log_density - 0.5 * log_determinant + log_weight, signal, source)
         };
-        let residues = self.residues(restricted, ratio, (c, white.dot(white)), (sources, products));
+        let residues = self.residues(ratio, (c, white.dot(white)), (sources, products));
         let tried: Vec<_> = residues.map(fit).collect();
         if self.densities.is_empty() { average(ratio, &tried) } else { sampled(ratio, &tried) }
     }
@@ -340,21 +341,19 @@ impl<'a> Evidence<'a> {
     /// Residues of channel `c`, with |M·L⁻¹·y|² = `square`, without a source or with each source and amplitude.
     pub fn residues(
         &self,
-        restricted: &RestrictedCovariance,
         ratio: f64,
         (c, square): (usize, f64),
         (sources, products): (&WhiteSources, &ArrayView1<f64>),
     ) -> impl Iterator<Item = Residue> {
         let square = square + self.repeats.squares[c] / ratio;
-        let log_determinant = self.log_determinant(restricted, ratio);
         let without =
-            sources.is_empty().then_some(Residue { square, log_determinant, weight: 1.0, source: None });
+            sources.is_empty().then_some(Residue { square, log_weight: 0.0, weight: 1.0, source: None });
         let with = sources.amplitudes.iter().map(move |amplitude| {
-            let Amplitude { place, variance, log_determinant: of_source, weight } = *amplitude;
+            let Amplitude { place, variance, log_weight, weight } = *amplitude;
             let product = products[place];
             Residue {
                 square: (square - variance * product * product).max(f64::MIN_POSITIVE),
-                log_determinant: log_determinant + of_source,
+                log_weight,
                 weight,
                 source: Some(SourceFit { place, weight: 0.0, amplitude: variance * product, variance }),
             }
@@ -367,9 +366,8 @@ impl<'a> Evidence<'a> {
 pub(super) struct Residue {
     /// |M·L⁻¹·y|² over s².
     pub square: f64,
-    /// ln of all determinants.
-    log_determinant: f64,
-    /// (1 + τ·vᵀ·v)^−½.
+    /// −½·ln(1 + τ·vᵀ·v), and its exponential.
+    log_weight: f64,
     pub weight: f64,
     source: Option<SourceFit>,
 }
@@ -393,9 +391,8 @@ struct Amplitude {
     place: usize,
     /// τ/(1 + τ·vᵀ·v).
     variance: f64,
-    /// ln(1 + τ·vᵀ·v).
-    log_determinant: f64,
-    /// (1 + τ·vᵀ·v)^−½.
+    /// −½·ln(1 + τ·vᵀ·v), and its exponential, which all channels share.
+    log_weight: f64,
     weight: f64,
 }
 
@@ -409,7 +406,7 @@ impl WhiteSources {
             taus.iter().map(move |tau| Amplitude {
                 place,
                 variance: tau / (1.0 + tau * length),
-                log_determinant: (tau * length).ln_1p(),
+                log_weight: -0.5 * (tau * length).ln_1p(),
                 weight: (1.0 + tau * length).sqrt().recip(),
             })
         });

@@ -179,7 +179,7 @@ impl InfluenceModel {
         };
         let mut scored = vec![ScoredFit::new(smooth, &presses, watch)?];
         if presses.positions_m().len() >= LEAST_TO_JUDGE
-            && let Some(sources) = search.sources(&scored[0].found.prior)?
+            && let Some(sources) = search.sources(&scored[0].fit.prior)?
         {
             match ScoredFit::new(sources, &presses, watch) {
                 Ok(sources) => scored.push(sources),
@@ -188,9 +188,9 @@ impl InfluenceModel {
                 Err(error) => return Err(error),
             }
         }
-        let lengths_m = scored[0].found.prior.lengths_m.clone();
+        let lengths_m = scored[0].fit.prior.lengths_m.clone();
         let best = scored.into_iter().max_by(|a, b| a.score.total_cmp(&b.score));
-        let Some(ScoredFit { found: StructureFit { prior, fits, sensors_m }, widening, .. }) = best else {
+        let Some(ScoredFit { fit: StructureFit { prior, fits, sensors_m }, widening, .. }) = best else {
             return Ok(None);
         };
         let set_aside = set_aside.to_vec();
@@ -212,6 +212,11 @@ impl InfluenceModel {
 
     pub fn shared_errors(&self) -> Result<Vec<f64>, MeasuredError> {
         Ok(loadings(&self.presses, &self.prior, &self.fits, &self.sensors_m)?)
+    }
+
+    /// Length scale of the finest influence functions along an axis; 0 with point sensors, which have none.
+    pub fn finest_m(&self, k: usize) -> f64 {
+        if self.average.has_source() { 0.0 } else { self.average.shortest_m(k) }
     }
 
     /// Offsets, and influences per newton of φ.
@@ -318,17 +323,17 @@ struct StructureFit {
 }
 
 struct ScoredFit {
-    found: StructureFit,
+    fit: StructureFit,
     score: f64,
     widening: f64,
 }
 
 impl ScoredFit {
-    fn new(found: StructureFit, presses: &CalibrationRows, watch: Watch) -> Result<Self, MeasuredError> {
+    fn new(fit: StructureFit, presses: &CalibrationRows, watch: Watch) -> Result<Self, MeasuredError> {
         let mut errors: Vec<[f64; 3]> = Vec::new();
         for (held, kept) in folds(presses) {
             watch.round()?;
-            found.add_errors(presses, &held, &presses.select(&kept), &mut errors, watch)?;
+            fit.add_errors(presses, &held, &presses.select(&kept), &mut errors, watch)?;
         }
         let score = |[square, noise, process]: &[f64; 3]| {
             let variance = noise + process;
@@ -337,7 +342,7 @@ impl ScoredFit {
         let score = errors.iter().map(score).sum();
         let is_judged = presses.positions_m().len() >= LEAST_TO_WIDEN;
         let widening = if is_judged { widening(&errors) } else { 1.0 };
-        Ok(Self { found, score, widening })
+        Ok(Self { fit, score, widening })
     }
 }
 
@@ -363,13 +368,6 @@ fn folds(presses: &CalibrationRows) -> Vec<(Vec<usize>, Vec<usize>)> {
         (presses.force_n[i] != 0.0).then_some(place % FOLDS)
     };
     (0..FOLDS).map(|fold| (0..presses.len()).partition(|i| fold_of(*i) == Some(fold))).collect()
-}
-
-impl InfluenceModel {
-    /// Length scale of the finest influence functions along an axis; 0 with point sensors, which have none.
-    pub fn finest_m(&self, k: usize) -> f64 {
-        if self.average.has_source() { 0.0 } else { self.average.shortest_m(k) }
-    }
 }
 
 impl StructureFit {
@@ -472,9 +470,9 @@ impl Search<'_> {
             // Scatter that grows with force resembles influences that change with force.
             let scatters = SCATTERS.map(|scatter| Prior { scatter, ..prior.clone() });
             let (scattered, _) = self.best_of(scatters, &[])?;
-            // Errors of forces and positions are common to all channels, and count once a channel.
-            let repeated = if prior.scatter > 0.0 { self.presses.centre.len() } else { 1 };
-            if found > best.max(scattered) + LEAST_GAIN * repeated as f64 {
+            // Wrong forces and positions move all channels together: every channel repeats their evidence.
+            let repeats = if prior.scatter > 0.0 { self.presses.centre.len() } else { 1 };
+            if found > best.max(scattered) + LEAST_GAIN * repeats as f64 {
                 prior = nonlinear;
             }
         }

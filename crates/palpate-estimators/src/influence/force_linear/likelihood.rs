@@ -61,13 +61,13 @@ impl ForceLinearLikelihood {
     }
 
     fn predict(&self, contacts: &[Contact]) -> Prediction {
-        let ForceLinearLocator { layers, offset_variance, .. } = &self.locator;
+        let ForceLinearLocator { layers, offset_variances, .. } = &self.locator;
         let channels = self.locator.stored.live.len();
         let root = self.locator.noise().sqrt().recip();
         let mut prediction = Prediction {
             reading: vec![0.0; channels],
             derivatives: vec![vec![0.0; channels]; PER_CONTACT * contacts.len()],
-            spreads: offset_variance.as_flattened()[..channels].to_vec(),
+            spreads: offset_variances.as_flattened()[..channels].to_vec(),
             noise: 1.0,
         };
         let force_is_free = if self.force_range.is_some() { 1.0 } else { 0.0 };

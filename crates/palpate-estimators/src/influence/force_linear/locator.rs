@@ -88,7 +88,7 @@ impl Tables {
 
     /// Returns whether the posterior variance of a contact's reading exceeds two channels' noise at half of
     /// the nodes.
-    pub fn are_open(&self, force_n: f64) -> bool {
+    pub fn are_undetermined(&self, force_n: f64) -> bool {
         const LEAST: f64 = 2.0;
         let ratio = |variances: &[f64]| force_n * force_n * variances.iter().sum::<f64>();
         let places = self.variances.chunks(self.offsets.len().max(1));
@@ -162,7 +162,7 @@ pub struct ForceLinearLocator {
     /// f, v and β.
     pub(super) layers: Layers,
     /// ω.
-    pub(super) offset_variance: Vec<Lanes>,
+    pub(super) offset_variances: Vec<Lanes>,
     /// r: independent share of the posterior variance.
     pub(super) own: Vec<Lanes>,
     /// u: loadings on common-mode errors.
@@ -174,7 +174,7 @@ pub struct ForceLinearLocator {
     noise_bound: f64,
     /// Critical value of the square's reduction by a contact.
     detection_bound: f64,
-    tells_untouched: bool,
+    identifies_untouched: bool,
     /// Whether the calibration's variance of a contact exceeds the noise at some node.
     pub(super) is_uncertain: bool,
 }
@@ -211,14 +211,14 @@ impl Stored {
                 let Tables { values, variances, covariances, .. } = &self.functions;
                 [values, variances, covariances][layer][place * self.live.len() + channel]
             }),
-            offset_variance: in_lanes(&self.functions.offset_variances),
+            offset_variances: in_lanes(&self.functions.offset_variances),
             own: in_lanes(&self.own_shares()),
             shared: in_lanes(&self.shared_errors),
             scan: CellScan::Bounded(Scan::default()),
             lengths: Vec::new(),
             noise_bound: 0.0,
             detection_bound: 0.0,
-            tells_untouched: true,
+            identifies_untouched: true,
             is_uncertain: self.functions.exceed_noise(self.mean_force_n),
             stored: self,
         };
@@ -501,12 +501,12 @@ impl ForceLinearLocator {
         };
         let change = move |Contact { position, force_n }: Contact| {
             let values = self.influences_at(position);
-            let offset_variance = &self.stored.functions.offset_variances;
+            let offset_variances = &self.stored.functions.offset_variances;
             let response_n = self.stored.prior.response_n(force_n);
             values
                 .iter()
-                .zip(offset_variance)
-                .map(|(f, offset_variance)| response_n * f / (1.0 + offset_variance).sqrt())
+                .zip(offset_variances)
+                .map(|(f, variance)| response_n * f / (1.0 + variance).sqrt())
                 .collect()
         };
         let noise_sds = self.noise_of_channels().into_iter().enumerate();
@@ -518,10 +518,8 @@ impl ForceLinearLocator {
     pub fn noise_of_channels(&self) -> Vec<Option<f64>> {
         let Tables { noise_sd, offset_variances, .. } = &self.stored.functions;
         let mut sds = vec![None; self.stored.channels];
-        for (channel, (sd, offset_variance)) in
-            self.stored.live.iter().zip(noise_sd.iter().zip(offset_variances))
-        {
-            sds[*channel] = Some(sd * (1.0 + offset_variance).sqrt());
+        for (channel, (sd, variance)) in self.stored.live.iter().zip(noise_sd.iter().zip(offset_variances)) {
+            sds[*channel] = Some(sd * (1.0 + variance).sqrt());
         }
         sds
     }
@@ -568,8 +566,8 @@ impl ForceLinearLocator {
             let offset_variance = self.stored.functions.offset_variances[c];
             let noise = self.noise() * self.noise_at(self.node(place));
             let (v, beta) = (variances[c], covariances[c]);
-            let told = if v > 0.0 { beta * beta / v } else { 0.0 };
-            let least = (noise + own[c] * (offset_variance - told).max(0.0)).powf(as_one.recip());
+            let explained = if v > 0.0 { beta * beta / v } else { 0.0 };
+            let least = (noise + own[c] * (offset_variance - explained).max(0.0)).powf(as_one.recip());
             ChannelAtPlace { f: values[c], noise, offset_variance, beta, v, least }
         };
         let bounded = |expected: [f64; 2], hardest_n: f64| {
@@ -611,19 +609,16 @@ impl ForceLinearLocator {
 
     /// Detection test by a reading's square and its reduction by the best contact.
     fn is_no_contact(&self, relative: &[f64]) -> bool {
-        let offset_variance = &self.stored.functions.offset_variances;
-        let square: f64 = relative
-            .iter()
-            .zip(offset_variance)
-            .map(|(d, offset_variance)| d * d / (1.0 + offset_variance))
-            .sum();
-        if square > self.noise_bound || !self.tells_untouched {
+        let offset_variances = &self.stored.functions.offset_variances;
+        let square: f64 =
+            relative.iter().zip(offset_variances).map(|(d, variance)| d * d / (1.0 + variance)).sum();
+        if square > self.noise_bound || !self.identifies_untouched {
             return false;
         }
         let taken = |place: usize| {
-            let channels = relative.iter().zip(self.place(place).values).zip(offset_variance);
-            let (fd, ff) = channels.fold((0.0, 0.0), |(fd, ff), ((d, f), offset_variance)| {
-                let scaled = f / (1.0 + offset_variance);
+            let channels = relative.iter().zip(self.place(place).values).zip(offset_variances);
+            let (fd, ff) = channels.fold((0.0, 0.0), |(fd, ff), ((d, f), variance)| {
+                let scaled = f / (1.0 + variance);
                 (fd + scaled * d, ff + scaled * f)
             });
             if fd > 0.0 { fd * fd / ff } else { 0.0 }
@@ -634,17 +629,17 @@ impl ForceLinearLocator {
     /// Returns whether contacts of half the mean force are distinguishable from noise.
     ///
     /// Without rows of force 0, uncertain offsets may prevent it: then no reading is `no_contact`.
-    pub fn tells_untouched(&self) -> bool {
-        self.tells_untouched
+    pub fn identifies_untouched(&self) -> bool {
+        self.identifies_untouched
     }
 
     /// Returns false where uncertain offsets alone hide such contacts at over a quarter of the nodes, or with a
     /// noise that no repeats measure.
-    fn offsets_are_told(&self) -> bool {
+    fn offsets_are_identified(&self) -> bool {
         const SHARE: f64 = 0.5;
         const HIDDEN: usize = 4;
         let force_n = SHARE * self.known_response_n().unwrap_or(self.stored.mean_force_n);
-        let is_told = |offset_variance: &dyn Fn(usize) -> f64| {
+        let is_identified = |offset_variance: &dyn Fn(usize) -> f64| {
             let square = |place: usize| -> f64 {
                 let values = self.place(place).values.iter().enumerate();
                 force_n * force_n * values.map(|(c, f)| f * f / (1.0 + offset_variance(c))).sum::<f64>()
@@ -653,7 +648,8 @@ impl ForceLinearLocator {
             HIDDEN * hidden <= self.places()
         };
         let noise_is_measured = self.stored.noise_freedom > LEAST_FREEDOM;
-        is_told(&|c| self.stored.functions.offset_variances[c]) || noise_is_measured && !is_told(&|_| 0.0)
+        is_identified(&|c| self.stored.functions.offset_variances[c])
+            || noise_is_measured && !is_identified(&|_| 0.0)
     }
 
     fn bound_noise(&mut self) {
@@ -665,7 +661,7 @@ impl ForceLinearLocator {
         let bounds = NoiseBounds::new(live, self.directions(), self.stored.false_alarm_rate);
         self.noise_bound = learnt(bounds.square, freedom * live as f64);
         self.detection_bound = learnt(bounds.taken, freedom);
-        self.tells_untouched = self.offsets_are_told();
+        self.identifies_untouched = self.offsets_are_identified();
     }
 
     fn directions(&self) -> Directions {

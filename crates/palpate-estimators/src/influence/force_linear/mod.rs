@@ -126,7 +126,11 @@ fn fit_condensed(
         outermost_m: (0..extent.dimensions()).map(outermost_m).collect(),
         channels: recording.channels.len(),
         live: learnt.live.clone(),
-        shared_errors: if functions.are_open(force.mean_n) { learnt.shared_errors()? } else { Vec::new() },
+        shared_errors: if functions.are_undetermined(force.mean_n) {
+            learnt.shared_errors()?
+        } else {
+            Vec::new()
+        },
         functions,
         known_force_n: setup.force_n(),
         mean_force_n: force.mean_n,

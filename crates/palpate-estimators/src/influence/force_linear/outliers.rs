@@ -35,14 +35,14 @@ impl OutlierTest<'_> {
             return Ok(Vec::new());
         }
         let freedom = freedom + tested.saturating_sub(n) as f64;
-        let externally = |square: f64, noise_shares: f64| {
+        let externally = |square: f64, noise_share: f64| {
             let others = (freedom - square).max(1e-3 * freedom);
             // The others do not predict an isolated press.
-            if noise_shares < LEAST_NOISE_SHARE { 0.0 } else { square * (freedom - 1.0) / others }
+            if noise_share < LEAST_NOISE_SHARE { 0.0 } else { square * (freedom - 1.0) / others }
         };
         let squares = Zip::from(&squares)
             .and(&noise_shares)
-            .map_collect(|square, noise_shares| externally(*square, *noise_shares));
+            .map_collect(|square, noise_share| externally(*square, *noise_share));
         let channels = self.fits.len();
         let bound = |count: usize, tests: usize| {
             let bound = chi_squared_critical_value(TAIL / tests as f64, count);

@@ -15,7 +15,7 @@ use crate::distributed_contact::{BoundedContact, distributed_contact_bound, dist
 use crate::force_prior::{ForceIntegral, ForceLikelihood};
 use crate::influence::grid::Axis;
 use crate::influence::inversion::{
-    CellBound, Cells, ContactLikelihood, ForceKnowledge, Inversion, Limits, PlaceFit, Slopes, bound_cells,
+    CellFit, Cells, ContactLikelihood, ForceKnowledge, Inversion, Limits, PlaceFit, Slopes, fit_cells,
 };
 use crate::influence::lanes::{LANES, Lanes, in_lanes};
 use crate::influence::levenberg::{Equations, Unknowns};
@@ -25,7 +25,7 @@ use palpate_core::Estimate;
 use palpate_numerics::{SharedError, simd, with_shared_error};
 
 impl ForceLinearLocator {
-    pub(super) fn seen(&self, relative: &[f64]) -> ReadingLikelihood<'_> {
+    pub(super) fn likelihood(&self, relative: &[f64]) -> ReadingLikelihood<'_> {
         ReadingLikelihood {
             locator: self,
             reading: in_lanes(relative),
@@ -42,8 +42,8 @@ impl ForceLinearLocator {
         let normal =
             [chi_squared_bound(freedom), distributed_contact_bound(self.stored.prior.extent.dimensions())];
         let [misfit, spread] = recording_bounds(normal, recording, |reading| {
-            let mut seen = Inversion::new(self.seen(&self.relative(reading)));
-            [seen.misfit(), seen.spread()]
+            let mut likelihood = Inversion::new(self.likelihood(&self.relative(reading)));
+            [likelihood.misfit(), likelihood.spread()]
         });
         (self.stored.residual_limit, self.stored.spread_limit) = (misfit, Some(spread));
     }
@@ -55,13 +55,14 @@ impl ForceLinearLocator {
     pub(super) fn estimate(&self, relative: &[f64]) -> Estimate {
         let Stored { residual_limit, spread_limit, .. } = self.stored;
         let limits = Limits { misfit: residual_limit, spread: spread_limit.unwrap_or(f64::INFINITY) };
-        Inversion::new(self.seen(relative)).estimate(self.force_knowledge(), limits)
+        Inversion::new(self.likelihood(relative)).estimate(self.force_knowledge(), limits)
     }
 
     /// Contact by summation over the grid.
     #[cfg(test)]
     pub fn summed_everywhere(&self, reading: &[f64], per_node: usize) -> palpate_core::ContactEstimate {
-        Inversion::new(self.seen(&self.relative(reading))).summed_everywhere(self.force_knowledge(), per_node)
+        Inversion::new(self.likelihood(&self.relative(reading)))
+            .summed_everywhere(self.force_knowledge(), per_node)
     }
 }
 
@@ -82,7 +83,7 @@ struct WeighChannels<'a, const SHARED: bool> {
     reading: &'a [Lanes],
     /// f, v and β.
     functions: [&'a [Lanes]; LAYERS],
-    offset_variance: &'a [Lanes],
+    offset_variances: &'a [Lanes],
     /// r and u.
     own: &'a [Lanes],
     shared: &'a [Lanes],
@@ -109,7 +110,7 @@ impl<const SHARED: bool> simd::Kernel for WeighChannels<'_, SHARED> {
         let Self {
             reading,
             functions: [values, variances, covariances],
-            offset_variance,
+            offset_variances,
             own,
             shared,
             noise,
@@ -124,7 +125,7 @@ impl<const SHARED: bool> simd::Kernel for WeighChannels<'_, SHARED> {
             let (mut spreads, mut weights) = ([0.0; LANES], [0.0; LANES]);
             for l in 0..LANES {
                 let (v, beta) = (variances[g][l].max(0.0), covariances[g][l]);
-                spreads[l] = (offset_variance[g][l] + force_n * (2.0 * beta + force_n * v)).max(0.0);
+                spreads[l] = (offset_variances[g][l] + force_n * (2.0 * beta + force_n * v)).max(0.0);
                 let own = if SHARED { own[g][l] * spreads[l] } else { spreads[l] };
                 weights[l] = 1.0 / (noise + own);
                 let (d, f) = (reading[g][l], values[g][l]);
@@ -165,18 +166,18 @@ impl<const SHARED: bool> simd::Kernel for WeighChannels<'_, SHARED> {
 
 impl ReadingLikelihood<'_> {
     fn weighed(&self, force_n: f64) -> WeightedSums {
-        let ForceLinearLocator { offset_variance, own, shared, layers, .. } = self.locator;
+        let ForceLinearLocator { offset_variances, own, shared, layers, .. } = self.locator;
         let of = |layer: usize| &self.between[layer * layers.groups()..(layer + 1) * layers.groups()];
         let functions = [of(VALUES), of(VARIANCES), of(COVARIANCES)];
         let noise = self.locator.noise() * self.noise;
         let reading = &self.reading;
         let weighed = if shared.is_empty() {
             let channels =
-                WeighChannels::<false> { reading, functions, offset_variance, own, shared, noise, force_n };
+                WeighChannels::<false> { reading, functions, offset_variances, own, shared, noise, force_n };
             simd::run_loops(channels)
         } else {
             let channels =
-                WeighChannels::<true> { reading, functions, offset_variance, own, shared, noise, force_n };
+                WeighChannels::<true> { reading, functions, offset_variances, own, shared, noise, force_n };
             simd::run_loops(channels)
         };
         // `log_determinant` is relative to the local noise.
@@ -229,11 +230,11 @@ impl ContactLikelihood for ReadingLikelihood<'_> {
         Cells::new(self.axes().map(|axis| axis.count), 1)
     }
 
-    fn scan(&self, bounds: &mut Vec<CellBound>) {
+    fn scan(&self, fits: &mut Vec<CellFit>) {
         let live = self.locator.stored.live.len();
         match &self.locator.scan {
-            CellScan::Bounded(scan) => bound_cells(scan, &self.reading, live, bounds),
-            CellScan::Broad(scan) => bound_cells(scan, &self.reading, live, bounds),
+            CellScan::Bounded(scan) => fit_cells(scan, &self.reading, live, fits),
+            CellScan::Broad(scan) => fit_cells(scan, &self.reading, live, fits),
         }
     }
 
@@ -253,14 +254,14 @@ impl ContactLikelihood for ReadingLikelihood<'_> {
     }
 
     fn weigh(&mut self, [x, y, response_n]: Unknowns) {
-        let ForceLinearLocator { layers, offset_variance, own, shared, .. } = self.locator;
+        let ForceLinearLocator { layers, offset_variances, own, shared, .. } = self.locator;
         layers.interpolate([x, y], VARIANCES..LAYERS, &mut self.between);
         let noise = self.locator.noise() * self.locator.noise_at([x, y]);
         let as_one = self.locator.stored.channels_as_one;
         let (variances, covariances) = self.between.split_at(self.reading.len());
         let spread = |g: usize, l: usize| {
             let v = variances[g][l].max(0.0);
-            (offset_variance[g][l] + response_n * (2.0 * covariances[g][l] + response_n * v)).max(0.0)
+            (offset_variances[g][l] + response_n * (2.0 * covariances[g][l] + response_n * v)).max(0.0)
         };
         let weight = |g: usize, l: usize| 1.0 / (as_one * (noise + own[g][l] * spread(g, l)));
         let error = |g: usize, l: usize| shared[g][l] * (as_one * spread(g, l)).sqrt();

@@ -47,8 +47,8 @@ impl Residuals {
                     let (column, _) = restricted.residuals(prior.sources(presses, place));
                     let column = column.column(0).to_owned();
                     let share = column.dot(&left) / column.dot(&column);
-                    let seen = projection.dot(&column);
-                    diagonal.scaled_add(-1.0 / column.dot(&column), &seen.mapv(|v| v * v));
+                    let explained = projection.dot(&column);
+                    diagonal.scaled_add(-1.0 / column.dot(&column), &explained.mapv(|v| v * v));
                     left.scaled_add(-share, &column);
                 }
                 let errors = projection.dot(&left);

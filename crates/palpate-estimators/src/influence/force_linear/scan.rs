@@ -68,7 +68,7 @@ impl CellBlocks for Scan {
 
     /// Least chi-squared, cost and φ of each node.
     #[inline(always)]
-    fn bounds<V: EightLanes>(&self, block: usize, reading: &[f64]) -> [V; 3] {
+    fn fits<V: EightLanes>(&self, block: usize, reading: &[f64]) -> [V; 3] {
         let of_block = block * self.channels..(block + 1) * self.channels;
         let channels = self.weights[of_block.clone()].iter().zip(&self.products[of_block]).zip(reading);
         let [expected, precision] = self.expected;

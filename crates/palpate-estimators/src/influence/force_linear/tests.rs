@@ -29,6 +29,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::rc::Rc;
 
+mod component;
 mod drift;
 mod edges;
 mod ends;

@@ -12,7 +12,7 @@ pub(in crate::influence) struct Cells {
 
 /// Candidate of the coarse search.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::influence) struct CellBound {
+pub(in crate::influence) struct CellFit {
     /// Approximate χ² at the best amplitude.
     pub misfit: f64,
     /// χ² plus the other terms of −2·ln of the posterior density.
@@ -53,32 +53,34 @@ impl Cells {
     }
 
     /// Local minima in order of cost.
-    pub(super) fn valleys(self, bounds: &[CellBound], most: usize) -> Vec<usize> {
+    pub(super) fn local_minima(self, fits: &[CellFit], most: usize) -> Vec<usize> {
         let counts @ [rows, columns] = self.counts();
         let cells = (0..rows).flat_map(|i| (0..columns).map(move |j| [i, j]));
-        let mut valleys: Vec<usize> =
-            cells.filter(|cell| is_valley(bounds, counts, *cell)).map(|[i, j]| i * columns + j).collect();
-        valleys.sort_by(|a, b| bounds[*a].cost.total_cmp(&bounds[*b].cost));
-        valleys.truncate(most);
-        valleys
+        let mut local_minima: Vec<usize> = cells
+            .filter(|cell| is_local_minimum(fits, counts, *cell))
+            .map(|[i, j]| i * columns + j)
+            .collect();
+        local_minima.sort_by(|a, b| fits[*a].cost.total_cmp(&fits[*b].cost));
+        local_minima.truncate(most);
+        local_minima
     }
 }
 
 /// Of equal cells, only the first is a minimum.
-fn is_valley(bounds: &[CellBound], [rows, columns]: [usize; 2], [i, j]: [usize; 2]) -> bool {
+fn is_local_minimum(fits: &[CellFit], [rows, columns]: [usize; 2], [i, j]: [usize; 2]) -> bool {
     let around = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
     let cell = i * columns + j;
-    let cost = bounds[cell].cost;
+    let cost = fits[cell].cost;
     // Two neighbours exclude most cells.
-    let is_before = i > 0 && bounds[cell - columns].cost <= cost;
-    let is_behind = i + 1 < rows && bounds[cell + columns].cost < cost;
+    let is_before = i > 0 && fits[cell - columns].cost <= cost;
+    let is_behind = i + 1 < rows && fits[cell + columns].cost < cost;
     !is_before
         && !is_behind
         && cost.is_finite()
         && around(i, rows).all(|i| {
             around(j, columns).all(|j| {
                 let other = i * columns + j;
-                let from = bounds[other].cost;
+                let from = fits[other].cost;
                 !(from < cost || other < cell && from == cost)
             })
         })
@@ -88,38 +90,38 @@ pub(in crate::influence) trait CellBlocks {
     fn cells(&self) -> usize;
 
     /// χ², cost and amplitude of each cell of a block.
-    fn bounds<V: EightLanes>(&self, block: usize, reading: &[f64]) -> [V; 3];
+    fn fits<V: EightLanes>(&self, block: usize, reading: &[f64]) -> [V; 3];
 }
 
-pub(in crate::influence) fn bound_cells(
+pub(in crate::influence) fn fit_cells(
     blocks: &impl CellBlocks,
     reading: &[Lanes],
     channels: usize,
-    bounds: &mut Vec<CellBound>,
+    fits: &mut Vec<CellFit>,
 ) {
     let reading = &reading.as_flattened()[..channels];
-    InstructionSet::best().run(BoundCells { blocks, reading, bounds });
+    InstructionSet::best().run(CellFitKernel { blocks, reading, fits });
 }
 
-struct BoundCells<'a, C> {
+struct CellFitKernel<'a, C> {
     blocks: &'a C,
     reading: &'a [f64],
-    bounds: &'a mut Vec<CellBound>,
+    fits: &'a mut Vec<CellFit>,
 }
 
-impl<C: CellBlocks> Kernel for BoundCells<'_, C> {
+impl<C: CellBlocks> Kernel for CellFitKernel<'_, C> {
     type Output = ();
     const FUSED: bool = true;
 
     #[inline(always)] // Compiled for the instructions of its caller.
     fn run<S: Simd>(self) {
-        let Self { blocks, reading, bounds } = self;
-        bounds.clear();
+        let Self { blocks, reading, fits } = self;
+        fits.clear();
         for block in 0..blocks.cells().div_ceil(LANES) {
             let [misfits, costs, latents] =
-                blocks.bounds::<S::F64>(block, reading).map(|eight| eight.to_array());
+                blocks.fits::<S::F64>(block, reading).map(|eight| eight.to_array());
             for l in 0..LANES.min(blocks.cells() - LANES * block) {
-                bounds.push(CellBound { misfit: misfits[l], cost: costs[l], latent: latents[l] });
+                fits.push(CellFit { misfit: misfits[l], cost: costs[l], latent: latents[l] });
             }
         }
     }

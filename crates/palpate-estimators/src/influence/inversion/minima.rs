@@ -1,6 +1,6 @@
 //! Local minima of a reading's cost, and their modes.
 
-use super::cells::CellBound;
+use super::cells::CellFit;
 use super::{ContactLikelihood, PlaceFit};
 use crate::influence::levenberg::{Unknowns, descend};
 use palpate_numerics::small::Matrix;
@@ -15,18 +15,18 @@ pub(super) struct Minimum {
 /// A minimum this far above the best has e⁻¹² of its probability.
 const NEGLIGIBLE: f64 = 24.0;
 /// More minima rarely compete.
-const MOST_VALLEYS: usize = 8;
+const MOST_MINIMA: usize = 8;
 /// Least decrease of χ² per step: a thirtieth of a standard deviation, squared.
 const SMALL: f64 = 1e-3;
 
 /// Returns the relevant minima, best first.
-pub(super) fn minima<E: ContactLikelihood>(reading: &mut E, bounds: &[CellBound]) -> Vec<Minimum> {
+pub(super) fn minima<E: ContactLikelihood>(reading: &mut E, fits: &[CellFit]) -> Vec<Minimum> {
     let cells = reading.cells();
-    let mut found: Vec<Minimum> = Vec::with_capacity(MOST_VALLEYS);
+    let mut found: Vec<Minimum> = Vec::with_capacity(MOST_MINIMA);
     let mut best = f64::INFINITY;
-    for cell in cells.valleys(bounds, MOST_VALLEYS) {
-        let CellBound { latent, .. } = bounds[cell];
-        if least_cost(reading, cell, &bounds[cell]) > best + NEGLIGIBLE {
+    for cell in cells.local_minima(fits, MOST_MINIMA) {
+        let CellFit { latent, .. } = fits[cell];
+        if least_cost(reading, cell, &fits[cell]) > best + NEGLIGIBLE {
             continue;
         }
         let [x, y] = cells.middle(cell).map(|node| node as f64);
@@ -47,13 +47,13 @@ pub(super) fn minima<E: ContactLikelihood>(reading: &mut E, bounds: &[CellBound]
 }
 
 /// Approximate lower bound of the cost within a cell.
-pub(super) fn least_cost<E: ContactLikelihood>(reading: &E, cell: usize, look: &CellBound) -> f64 {
+pub(super) fn least_cost<E: ContactLikelihood>(reading: &E, cell: usize, fit: &CellFit) -> f64 {
     let cells = reading.cells();
-    let [along, across] = reading.lengths(cells.middle(cell), look.latent);
+    let [along, across] = reading.lengths(cells.middle(cell), fit.latent);
     let [(x0, x1), (y0, y1)] = cells.span(cell);
     let reach = 0.5 * (along * (x1 - x0)).hypot(across * (y1 - y0));
-    let closest = (look.misfit.max(0.0).sqrt() - reach).max(0.0);
-    closest * closest + (look.cost - look.misfit)
+    let closest = (fit.misfit.max(0.0).sqrt() - reach).max(0.0);
+    closest * closest + (fit.cost - fit.misfit)
 }
 
 /// True of one local minimum: on the line between both the cost rises by at most 1.

@@ -10,7 +10,7 @@ mod posterior;
 mod quadrature;
 mod tiles;
 
-pub(super) use cells::{CellBlocks, CellBound, Cells, bound_cells};
+pub(super) use cells::{CellBlocks, CellFit, Cells, fit_cells};
 pub(super) use layers::{Layers, Slopes, Stencil};
 pub(super) use posterior::{ForceKnowledge, Inversion, Limits};
 pub(super) use quadrature::FIVE_POINTS;
@@ -36,7 +36,7 @@ pub(super) trait ContactLikelihood {
     fn cells(&self) -> Cells;
 
     /// Approximate lower bounds of the costs of all cells.
-    fn scan(&self, bounds: &mut Vec<CellBound>);
+    fn scan(&self, fits: &mut Vec<CellFit>);
 
     /// True where minima may be missing from these bounds.
     fn bounds_are_loose(&self) -> bool;

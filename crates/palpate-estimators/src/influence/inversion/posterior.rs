@@ -3,7 +3,7 @@
 //! [Quadrature](super::quadrature) integrates a single, nearly normal mode, [tiles](super::tiles) all other
 //! posteriors.
 
-use super::cells::CellBound;
+use super::cells::CellFit;
 use super::minima::{Minimum, minima, modes};
 use super::quadrature::{self, WeightedPlace};
 use super::tiles::{CUT, Lattice, Leaf, candidates};
@@ -37,16 +37,16 @@ pub(in crate::influence) struct Limits {
 #[derive(Debug)]
 pub(in crate::influence) struct Inversion<E> {
     reading: E,
-    bounds: Vec<CellBound>,
+    fits: Vec<CellFit>,
     minima: Vec<Minimum>,
 }
 
 impl<E: ContactLikelihood> Inversion<E> {
     pub fn new(mut reading: E) -> Self {
-        let mut bounds = Vec::with_capacity(reading.cells().len());
-        reading.scan(&mut bounds);
-        let minima = minima(&mut reading, &bounds);
-        Self { reading, bounds, minima }
+        let mut fits = Vec::with_capacity(reading.cells().len());
+        reading.scan(&mut fits);
+        let minima = minima(&mut reading, &fits);
+        Self { reading, fits, minima }
     }
 
     pub fn misfit(&self) -> f64 {
@@ -110,10 +110,10 @@ impl<E: ContactLikelihood> Inversion<E> {
 
     /// `None` where the sum is not a positive number.
     fn sum(&mut self) -> Option<Posterior> {
-        let Self { reading, bounds, minima } = self;
+        let Self { reading, fits, minima } = self;
         let axes = reading.axes();
         let modes = modes(reading, minima);
-        let others = candidates(reading, bounds, minima);
+        let others = candidates(reading, fits, minima);
         let mut posterior =
             Posterior { modes: vec![Probable::default(); minima.len()], ..Posterior::default() };
         let mut slices = [Slices::default(), Slices::default()];

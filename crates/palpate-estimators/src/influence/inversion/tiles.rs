@@ -1,6 +1,6 @@
 //! Integration of a posterior over tiles around its minima, from neighbour to neighbour.
 
-use super::cells::CellBound;
+use super::cells::CellFit;
 use super::minima::{Minimum, least_cost};
 use super::{ContactLikelihood, PlaceFit};
 
@@ -29,15 +29,15 @@ pub(super) struct Candidate {
 
 pub(super) fn candidates<E: ContactLikelihood>(
     reading: &E,
-    bounds: &[CellBound],
+    fits: &[CellFit],
     minima: &[Minimum],
 ) -> Vec<Vec<Candidate>> {
     let cells = reading.cells();
     let mut candidates = vec![Vec::new(); minima.len()];
-    for (cell, look) in bounds.iter().enumerate() {
-        if least_cost(reading, cell, look) <= minima[0].found.cost + CUT {
+    for (cell, fit) in fits.iter().enumerate() {
+        if least_cost(reading, cell, fit) <= minima[0].found.cost + CUT {
             let place = cells.middle(cell).map(|node| node as f64);
-            candidates[nearest(minima, place)].push(Candidate { place, latent: look.latent });
+            candidates[nearest(minima, place)].push(Candidate { place, latent: fit.latent });
         }
     }
     candidates
@@ -70,8 +70,8 @@ impl Lattice {
         let is_plane = reading.axes().iter().all(|axis| axis.count > 1);
         let fine = FINE[usize::from(is_plane)];
         let step = |own: f64, with_latent: f64, length: f64| {
-            let told = if tt > 0.0 { own - with_latent * with_latent / tt } else { own };
-            (fine / told.max(0.0).sqrt().max(length)).clamp(LEAST_STEP, MOST_STEP)
+            let conditional = if tt > 0.0 { own - with_latent * with_latent / tt } else { own };
+            (fine / conditional.max(0.0).sqrt().max(length)).clamp(LEAST_STEP, MOST_STEP)
         };
         [step(xx, xt, lengths[0]), step(yy, yt, lengths[1])]
     }
@@ -106,11 +106,12 @@ impl Lattice {
         let best = minima[0].found.cost;
         let start = self.tile([at[0], at[1]]);
         let corner = start.map(|tile| tile.saturating_sub(MOST_TILES));
-        let seen_at = |tile: [usize; 2]| (tile[0] - corner[0]) * (2 * MOST_TILES + 1) + (tile[1] - corner[1]);
+        let index_of =
+            |tile: [usize; 2]| (tile[0] - corner[0]) * (2 * MOST_TILES + 1) + (tile[1] - corner[1]);
         let wide = |k: usize| (start[k] + MOST_TILES + 1).min(self.counts[k]) - corner[k];
         let is_near = |tile: [usize; 2]| (0..2).all(|k| tile[k].abs_diff(start[k]) <= MOST_TILES);
-        let mut seen = vec![false; (wide(0) - 1) * (2 * MOST_TILES + 1) + wide(1)];
-        seen[seen_at(start)] = true;
+        let mut visited = vec![false; (wide(0) - 1) * (2 * MOST_TILES + 1) + wide(1)];
+        visited[index_of(start)] = true;
         let (mut open, mut leaves) = (vec![(start, at[2])], Vec::new());
         let mut others = others.iter();
         loop {
@@ -131,7 +132,7 @@ impl Lattice {
                     if !is_near(next) {
                         return None;
                     }
-                    if !std::mem::replace(&mut seen[seen_at(next)], true) {
+                    if !std::mem::replace(&mut visited[index_of(next)], true) {
                         open.push((next, found.latent));
                     }
                 }
@@ -140,7 +141,7 @@ impl Lattice {
             let Some(Candidate { place, latent }) = others.next() else { return Some(leaves) };
             let tile = self.tile(*place);
             if is_near(tile) {
-                if !std::mem::replace(&mut seen[seen_at(tile)], true) {
+                if !std::mem::replace(&mut visited[index_of(tile)], true) {
                     open.push((tile, *latent));
                 }
             } else if reading.fit_place(*place, *latent).cost <= best + CUT {

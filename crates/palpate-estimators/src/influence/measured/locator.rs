@@ -9,8 +9,8 @@ use crate::fit::{Locate, LocatorFault, NoCheck};
 use crate::force_prior::PriorTerms;
 use crate::influence::grid::{Axis, check_axes, greatest_distances, middle};
 use crate::influence::inversion::{
-    CellBound, Cells, ContactLikelihood, ForceKnowledge, Inversion, Layers, Limits, PlaceFit, Slopes,
-    Stencil, bound_cells,
+    CellFit, Cells, ContactLikelihood, ForceKnowledge, Inversion, Layers, Limits, PlaceFit, Slopes, Stencil,
+    fit_cells,
 };
 use crate::influence::lanes::{LANES, Lanes, in_lanes};
 use crate::influence::levenberg::{EquationSums, Equations, Unknowns};
@@ -154,7 +154,7 @@ impl MeasuredLocator {
 
     /// Least squared residual over the variances; NaN off the scale.
     pub(super) fn misfit(&self, reading: &[f64]) -> f64 {
-        self.seen(reading).map_or(f64::NAN, |seen| Inversion::new(seen).misfit())
+        self.likelihood(reading).map_or(f64::NAN, |likelihood| Inversion::new(likelihood).misfit())
     }
 
     /// Contact by summation over the grid.
@@ -164,7 +164,7 @@ impl MeasuredLocator {
         reading: &[f64],
         per_node: usize,
     ) -> palpate_core::ContactEstimate {
-        Inversion::new(self.seen(reading).expect("on its scale"))
+        Inversion::new(self.likelihood(reading).expect("on its scale"))
             .summed_everywhere(self.force_knowledge(), per_node)
     }
 
@@ -182,7 +182,7 @@ impl MeasuredLocator {
     }
 
     /// Whitened reading; `None` off its scale.
-    fn seen(&self, reading: &[f64]) -> Option<ReadingLikelihood<'_>> {
+    fn likelihood(&self, reading: &[f64]) -> Option<ReadingLikelihood<'_>> {
         let Stored { readings, whitening, .. } = &self.stored;
         let in_use = self.stored.channels_in_use().map(|channel| readings.scaled(reading[channel]));
         let scaled = in_use.collect::<Option<Vec<f64>>>()?;
@@ -207,10 +207,10 @@ impl Locate for MeasuredLocator {
 
     fn locate(&self, reading: &[f64]) -> Estimate {
         let Stored { table, residual_limit, .. } = &self.stored;
-        match self.seen(reading) {
-            Some(seen) => {
+        match self.likelihood(reading) {
+            Some(likelihood) => {
                 let limits = Limits { misfit: *residual_limit, spread: f64::INFINITY };
-                Inversion::new(seen).estimate(self.force_knowledge(), limits)
+                Inversion::new(likelihood).estimate(self.force_knowledge(), limits)
             }
             None => Estimate::of_position(middle([table.x, table.y]), Status::OutsideModel),
         }
@@ -423,13 +423,8 @@ impl ContactLikelihood for ReadingLikelihood<'_> {
         self.locator.search.cells
     }
 
-    fn scan(&self, bounds: &mut Vec<CellBound>) {
-        bound_cells(
-            &self.locator.search.scan,
-            &self.reading,
-            self.locator.stored.whitening.channels(),
-            bounds,
-        );
+    fn scan(&self, fits: &mut Vec<CellFit>) {
+        fit_cells(&self.locator.search.scan, &self.reading, self.locator.stored.whitening.channels(), fits);
     }
 
     fn bounds_are_loose(&self) -> bool {

@@ -74,7 +74,7 @@ impl CellBlocks for Scan {
 
     /// Least squared residual of each cell, and the nuisance coordinate there.
     #[inline(always)]
-    fn bounds<V: EightLanes>(&self, block: usize, reading: &[f64]) -> [V; 3] {
+    fn fits<V: EightLanes>(&self, block: usize, reading: &[f64]) -> [V; 3] {
         let (zero, one, two) = (V::splat(0.0), V::splat(1.0), V::splat(2.0));
         let mut own = zero;
         for (weights, z) in self.weights[block * self.channels..].iter().zip(reading) {

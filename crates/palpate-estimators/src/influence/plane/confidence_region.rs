@@ -58,7 +58,7 @@ struct Way {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct BoundaryPoint {
+struct RegionPoint {
     at: Unknowns,
     /// √(cost − least) − √q; positive where excluded.
     beyond: [f64; 3],
@@ -70,23 +70,23 @@ impl Search {
         &self,
         (whitened, square): (&[f64], f64),
         minima: &[Minimum],
-        looked: impl Iterator<Item = PlaceProfile>,
+        profile: impl Iterator<Item = PlaceProfile>,
         estimate: Unknowns,
     ) -> ConfidenceIntervals {
         let limits = [self.size_m[0], self.size_m[1], self.greatest_force_n];
         if self.rule.net_reduction(square, minima[0].misfit) <= faint() {
             return ConfidenceIntervals(limits.map(|limit| (0.0, limit)));
         }
-        let looked: Vec<PlaceProfile> =
-            looked.chain(minima.iter().map(|minimum| self.looked_at(whitened, minimum))).collect();
-        let least = looked.iter().map(|looked| looked.cost).fold(f64::INFINITY, f64::min);
+        let profile: Vec<PlaceProfile> =
+            profile.chain(minima.iter().map(|minimum| self.profile_of(whitened, minimum))).collect();
+        let least = profile.iter().map(|profile| profile.cost).fold(f64::INFINITY, f64::min);
         let reading = Reading { search: self, whitened, least };
         // q far from all edges.
         let most_above = CALIBRATED * likelihood_bound(f64::INFINITY);
-        let likely: Vec<(BoundaryPoint, [f64; 3])> = looked
+        let likely: Vec<(RegionPoint, [f64; 3])> = profile
             .iter()
-            .filter(|looked| looked.cost - least <= most_above)
-            .map(|looked| (reading.found(looked.at, looked.cost), looked.steps))
+            .filter(|profile| profile.cost - least <= most_above)
+            .map(|profile| (reading.point(profile.at, profile.cost), profile.steps))
             .collect();
         let end = |unknown: usize, side: f64| {
             let way = Way { unknown, side, limit: if side < 0.0 { 0.0 } else { limits[unknown] } };
@@ -97,7 +97,7 @@ impl Search {
         }))
     }
 
-    fn looked_at(&self, whitened: &[f64], minimum: &Minimum) -> PlaceProfile {
+    fn profile_of(&self, whitened: &[f64], minimum: &Minimum) -> PlaceProfile {
         let [x_m, y_m, _] = minimum.at;
         let best = self.profiled(whitened, [x_m, y_m]);
         let [along_m, across_m] = self.coarse.cell_m.map(|cell_m| 0.125 * cell_m);
@@ -116,16 +116,16 @@ struct Reading<'a> {
 }
 
 impl Reading<'_> {
-    fn found(&self, at: Unknowns, cost: f64) -> BoundaryPoint {
+    fn point(&self, at: Unknowns, cost: f64) -> RegionPoint {
         let root = (cost - self.least).max(0.0).sqrt();
         let [along, across] = self.search.edges.distances(at);
         let distances = [along, across, along.min(across)];
         let beyond = distances.map(|distance| root - (CALIBRATED * likelihood_bound(distance)).sqrt());
-        BoundaryPoint { at, beyond }
+        RegionPoint { at, beyond }
     }
 
     /// Contact with the other unknowns profiled.
-    fn held(&self, unknown: usize, value: f64, from: &BoundaryPoint) -> BoundaryPoint {
+    fn constrained(&self, unknown: usize, value: f64, from: &RegionPoint) -> RegionPoint {
         let Self { search, whitened, .. } = *self;
         let mut start = from.at;
         start[unknown] = value;
@@ -141,14 +141,14 @@ impl Reading<'_> {
         if unknown != FORCE {
             at[FORCE] = best.force_n;
         }
-        self.found(at, best.misfit_with(at[FORCE]) + search.spread(place))
+        self.point(at, best.misfit_with(at[FORCE]) + search.spread(place))
     }
 
     /// Last included value; `None` where no likely contact is included.
-    fn end(&self, way: Way, likely: &[(BoundaryPoint, [f64; 3])]) -> Option<f64> {
+    fn end(&self, way: Way, likely: &[(RegionPoint, [f64; 3])]) -> Option<f64> {
         let Way { unknown, side, limit } = way;
-        let is_inside = |found: &BoundaryPoint| found.beyond[unknown] <= 0.0;
-        let reach = |(found, steps): &(BoundaryPoint, [f64; 3])| {
+        let is_inside = |found: &RegionPoint| found.beyond[unknown] <= 0.0;
+        let reach = |(found, steps): &(RegionPoint, [f64; 3])| {
             side * found.at[unknown] - found.beyond[unknown] * steps[unknown]
         };
         let farthest =
@@ -160,7 +160,7 @@ impl Reading<'_> {
                 return Some(limit);
             }
             let next = if step < left { inside.at[unknown] + side * step } else { limit };
-            let found = self.held(unknown, next, &inside);
+            let found = self.constrained(unknown, next, &inside);
             if !is_inside(&found) {
                 return Some(self.between(unknown, inside, found));
             }
@@ -170,7 +170,7 @@ impl Reading<'_> {
     }
 
     /// Last included value, by the Illinois method (Dowell and Jarratt, BIT 11, 1971).
-    fn between(&self, unknown: usize, mut inside: BoundaryPoint, mut outside: BoundaryPoint) -> f64 {
+    fn between(&self, unknown: usize, mut inside: RegionPoint, mut outside: RegionPoint) -> f64 {
         let (mut stayed, mut weights) = (None, [1.0, 1.0]);
         for _ in 0..ROUNDS {
             let beyond = [&inside, &outside].map(|found| found.beyond[unknown]);
@@ -180,7 +180,7 @@ impl Reading<'_> {
             let [below, above] = [weights[0] * beyond[0], weights[1] * beyond[1]];
             let share = if beyond[1] > STEEP { 0.5 } else { below / (below - above) };
             let value = inside.at[unknown] + share * (outside.at[unknown] - inside.at[unknown]);
-            let found = self.held(unknown, value, &inside);
+            let found = self.constrained(unknown, value, &inside);
             let moved = usize::from(found.beyond[unknown] > 0.0);
             *[&mut inside, &mut outside][moved] = found;
             weights[moved] = 1.0;

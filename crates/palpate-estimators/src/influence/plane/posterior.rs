@@ -38,9 +38,9 @@ pub(super) fn locate(search: &Search, reading: &[f64], scratch: &mut Scratch) ->
     let is_traded_off =
         matches!(surroundings.shape, Shape::Bent | Shape::Summed) && search.force == ForceBelief::Unknown;
     if let (true, Some(uncertainty)) = (is_traded_off, &mut estimate.contact.uncertainty) {
-        let looked = scratch.leaves.iter().map(|leaf| leaf.looked);
+        let profile = scratch.leaves.iter().map(|leaf| leaf.profile);
         search
-            .confidence_region((&scratch.whitened, square), minima, looked, modes[0].mean)
+            .confidence_region((&scratch.whitened, square), minima, profile, modes[0].mean)
             .write(uncertainty);
     }
     for mode in modes[1..].iter().filter(|mode| mode.weight >= OTHER_PLACE) {
@@ -209,7 +209,7 @@ impl Search {
         let Scratch { whitened, profile, blocks, leaves } = scratch;
         leaves.clear();
         blocks.clear();
-        let mut looked_at = 0;
+        let mut profile_of = 0;
         let best = self.cost(&minima[0]);
         let most = best + CUT;
         for cell in 0..self.coarse.cells() {
@@ -225,8 +225,8 @@ impl Search {
                 held_length: self.coarse.whole_lengths[cell].map(|length| self.greatest_force_n * length),
             });
             while let Some(block) = blocks.pop() {
-                looked_at += 1;
-                if looked_at > MOST_BLOCKS {
+                profile_of += 1;
+                if profile_of > MOST_BLOCKS {
                     return false;
                 }
                 let there = self.profiled(whitened, block.middle_m);
@@ -243,7 +243,7 @@ impl Search {
                     let [x_m, y_m] = block.middle_m;
                     leaves.push(Leaf {
                         weight: (0.5 * (best - misfit - spread)).exp() * area,
-                        looked: PlaceProfile {
+                        profile: PlaceProfile {
                             at: [x_m, y_m, force_n],
                             cost: misfit + spread,
                             steps: [0.5 * block.size_m[0], 0.5 * block.size_m[1], there.sd_n()],
@@ -261,8 +261,8 @@ impl Search {
         let mut moments = [Moments::default(); MOST_VALLEYS];
         let mut all = Moments::default();
         for leaf in &*leaves {
-            moments[leaf.mode].add(leaf.weight, leaf.looked.at);
-            all.add(leaf.weight, leaf.looked.at);
+            moments[leaf.mode].add(leaf.weight, leaf.profile.at);
+            all.add(leaf.weight, leaf.profile.at);
         }
         if !(all.weight.is_finite() && all.weight > 0.0) {
             return self.nothing_summed(&minima[0]);
@@ -312,7 +312,7 @@ fn growth(leaves: &mut [Leaf], about: [f64; 3], covariance: &[f64; 6]) -> f64 {
     let [xx, xy, _, yy, ..] = *covariance;
     let Some(factors) = Ldl::new(&[[xx, xy], [xy, yy]]) else { return 1.0 };
     for leaf in &mut *leaves {
-        leaf.distance = factors.quadratic([leaf.looked.at[0] - about[0], leaf.looked.at[1] - about[1]]);
+        leaf.distance = factors.quadratic([leaf.profile.at[0] - about[0], leaf.profile.at[1] - about[1]]);
     }
     leaves.sort_unstable_by(|a, b| a.distance.total_cmp(&b.distance));
     let all: f64 = leaves.iter().map(|leaf| leaf.weight).sum();
@@ -335,7 +335,7 @@ fn growth(leaves: &mut [Leaf], about: [f64; 3], covariance: &[f64; 6]) -> f64 {
 struct Leaf {
     /// Unnormalized.
     weight: f64,
-    looked: PlaceProfile,
+    profile: PlaceProfile,
     mode: usize,
     /// Squared distance from the estimate, in standard deviations.
     distance: f64,

@@ -11,7 +11,7 @@ fn assert_equals_likelihood_of_single_readings(locator: &ForceLinearLocator, tou
     for touch in touches {
         likelihood.whiten(&touch.reading, &mut whitened);
         let relative = locator.relative(&touch.reading);
-        let mut single = locator.seen(&relative);
+        let mut single = locator.likelihood(&relative);
         let mut differences = Vec::new();
         for (x, y, force_n) in [(0.1, 0.3, 0.7), (0.35, 0.55, 1.9), (0.5, 0.5, 4.5), (0.93, 0.8, 3.0)] {
             let size_m = [locator.extent().length_m(), locator.extent().width_m().unwrap_or(0.0)];
