@@ -21,6 +21,7 @@ mod mechanics;
 mod moving_contacts;
 mod moving_without_model;
 mod one_weight;
+mod outliers;
 mod parallel;
 mod plate_edges;
 mod plate_limit;

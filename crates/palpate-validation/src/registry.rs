@@ -3,8 +3,8 @@
 use crate::experiment::Experiment;
 use crate::{
     beam_ends, comparisons, designs, drift_and_creep, false_alarms, influence_sources, load_patches,
-    load_profiles, measured_edges, mechanics, moving_contacts, moving_without_model, one_weight, plate_edges,
-    plate_limit, real_benches, statuses, strips, studies, weighed,
+    load_profiles, measured_edges, mechanics, moving_contacts, moving_without_model, one_weight, outliers,
+    plate_edges, plate_limit, real_benches, statuses, strips, studies, weighed,
 };
 use anyhow::{Context, Result};
 
@@ -27,6 +27,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     strips::SCATTERED,
     strips::NOISE,
     strips::FEW,
+    outliers::EXPERIMENT,
     weighed::EXPERIMENT,
     moving_contacts::EXPERIMENT,
     moving_without_model::EXPERIMENT,

@@ -380,12 +380,12 @@ fn run_drifting(size: Size, progress: Progress) -> Result<Vec<Table>> {
 
 /// Standard deviations of forces (relative) and positions.
 #[derive(Clone, Copy, Debug)]
-struct PressErrors {
+pub struct PressErrors {
     force: f64,
     position_m: f64,
 }
 
-const PRESS_ERRORS: [(PressErrors, &str); 4] = [
+pub const PRESS_ERRORS: [(PressErrors, &str); 4] = [
     (PressErrors { force: 0.0, position_m: 0.0 }, "as recorded"),
     (PressErrors { force: 0.03, position_m: 0.0 }, "forces 3 %"),
     (PressErrors { force: 0.0, position_m: 1e-3 }, "positions 1 mm"),
@@ -393,13 +393,14 @@ const PRESS_ERRORS: [(PressErrors, &str); 4] = [
 ];
 
 /// Presses other places with other forces than recorded.
-fn record_with_errors(bench: &mut RawBench, errors: PressErrors) {
+pub fn record_with_errors(bench: &mut RawBench, errors: PressErrors) {
+    let length_m = bench.extent.length_m();
     let mut presses = std::mem::take(&mut bench.presses);
     for row in &mut presses {
         let mut normal = || -> f64 { StandardNormal.sample(&mut bench.rng) };
         let force_n = row.force_n.unwrap_or(0.0) * (1.0 + errors.force * normal());
-        let x_m = (row.position.x_m + errors.position_m * normal()).clamp(0.0, STRIP_M);
-        row.reading = bench.reading(Contact { position: Position::along(x_m), force_n });
+        let x_m = (row.position.x_m + errors.position_m * normal()).clamp(0.0, length_m);
+        row.reading = bench.reading(Contact { position: Position { x_m, ..row.position }, force_n });
     }
     bench.presses = presses;
 }

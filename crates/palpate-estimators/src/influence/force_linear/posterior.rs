@@ -231,19 +231,19 @@ pub(super) fn offsets(
     Ok(all)
 }
 
-struct Posterior<'a> {
+pub(super) struct Posterior<'a> {
     prior: &'a Prior,
     presses: &'a CalibrationRows,
-    solution: GeneralizedLeastSquares,
-    channels: Vec<ChannelPosterior>,
+    pub solution: GeneralizedLeastSquares,
+    pub channels: Vec<ChannelPosterior>,
 }
 
 impl<'a> Posterior<'a> {
-    fn new(
+    pub fn new(
         conditions: &Conditions<'a>,
         presses: &'a CalibrationRows,
         sensors_m: &[Vec<f64>],
-    ) -> Result<Self, MeasuredError> {
+    ) -> Result<Self, NotPositiveDefinite> {
         let Conditions { prior, ratio, ref channels, densities } = *conditions;
         let evidence = Evidence::new(presses, prior, sensors_m).with_noise(densities);
         let solution = GeneralizedLeastSquares::new(&evidence, ratio)?;
@@ -298,11 +298,11 @@ impl ProcessVariances {
     }
 }
 
-struct GeneralizedLeastSquares {
-    ratio: f64,
-    restricted: RestrictedCovariance,
+pub(super) struct GeneralizedLeastSquares {
+    pub ratio: f64,
+    pub restricted: RestrictedCovariance,
     /// M·L⁻¹·y and the coefficients of H, by channels.
-    white: Array2<f64>,
+    pub white: Array2<f64>,
     coefficients: Array2<f64>,
 }
 
@@ -315,12 +315,12 @@ impl GeneralizedLeastSquares {
 }
 
 #[derive(Clone)]
-struct Sources {
+pub(super) struct Sources {
     sensors_m: Vec<Vec<f64>>,
-    white: WhiteSources,
+    pub white: WhiteSources,
     /// Coefficients of H for L⁻¹·u.
     coefficients: Array2<f64>,
-    fits: Vec<SourceFit>,
+    pub fits: Vec<SourceFit>,
     /// s², averaged over the sources.
     signal: f64,
 }
@@ -394,10 +394,11 @@ impl Sources {
     }
 }
 
-struct ChannelPosterior {
-    c: usize,
-    signal: f64,
-    sources: Sources,
+pub(super) struct ChannelPosterior {
+    pub c: usize,
+    /// s².
+    pub signal: f64,
+    pub sources: Sources,
 }
 
 impl ChannelPosterior {
