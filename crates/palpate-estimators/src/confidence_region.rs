@@ -38,7 +38,7 @@ pub(crate) const CALIBRATED: f64 = 1.1;
 ///
 /// At most 0.12 % of the readings prefer the wrong side by q: with δ standard deviations between both, χ²
 /// differs by 2·δ·z − δ², z ~ N(0, 1), which exceeds q most often at δ = √q.
-const BEYOND_A_BARRIER: f64 = 9.21;
+pub(crate) const BEYOND_A_BARRIER: f64 = 9.21;
 
 /// Prior of the force, in newtons.
 #[derive(Clone, Copy, Debug, PartialEq)]

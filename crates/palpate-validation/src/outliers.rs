@@ -141,8 +141,8 @@ fn run(size: Size, progress: Progress) -> Result<Vec<Table>> {
     let as_recorded = PRESS_ERRORS[0];
     cases.push(Case { bench: Bench::Plate, errors: as_recorded, benches: size.pick(50, 1) });
     if size == Size::Full {
-        cases.push(Case { bench: Bench::PlateOf(450), errors: as_recorded, benches: 50 });
-        cases.push(Case { bench: Bench::PlateOf(1100), errors: as_recorded, benches: 6 });
+        cases.push(Case { bench: Bench::PlateOf(450), errors: as_recorded, benches: 10 });
+        cases.push(Case { bench: Bench::PlateOf(1100), errors: as_recorded, benches: 2 });
     }
     let rows = in_parallel(&cases, Case::row, |case| case.labels().join(", "), progress);
     let mut table = Table::new("Shares of all benches.", &["bench", "presses"], Case::columns());

@@ -26,8 +26,8 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Repetitions {
-    /// Per bench, from 0.
-    seeds: u64,
+    /// Of each line and each plane, from 0. Errors of a calibration are common to its contacts.
+    seeds: [u64; 2],
     /// Per seed, about.
     contacts: usize,
 }
@@ -38,7 +38,7 @@ const ZEROS: [(Zero, &str); 2] = [(Zero::Once, "once"), (Zero::Each, "each")];
 
 fn run(size: Size, progress: Progress) -> Result<Vec<Table>> {
     let repetitions =
-        size.pick(Repetitions { seeds: 2, contacts: 100 }, Repetitions { seeds: 1, contacts: 24 });
+        size.pick(Repetitions { seeds: [8, 2], contacts: 100 }, Repetitions { seeds: [1, 1], contacts: 24 });
     // The floor and the skin take most of the time.
     let benches: &[_] = size.pick(&BENCHES, &BENCHES[..1]);
     let cases = cases(benches)?;
@@ -133,7 +133,8 @@ fn judge(bench: &Bench, estimators: &[Estimator], repetitions: Repetitions) -> R
         failure: None,
     };
     let mut judged: Vec<EstimatorTallies> = estimators.iter().map(begin).collect();
-    for seed in 0..repetitions.seeds {
+    let is_plane = bench.rig.setup.surface().extent().width_m().is_some();
+    for seed in 0..repetitions.seeds[usize::from(is_plane)] {
         let recordings = bench.record(repetitions.contacts, seed)?;
         for (estimator, judged) in estimators.iter().zip(&mut judged) {
             // An estimator that refuses a bench has a row with the reason.
@@ -161,7 +162,7 @@ mod tests {
         for knowledge in [Knowledge::Model, Knowledge::Measured] {
             let error_mm = |world| {
                 let bench = Bench { rig: &rig, world, knowledge, forces: Forces::UNKNOWN };
-                let repetitions = Repetitions { seeds: 1, contacts: 12 };
+                let repetitions = Repetitions { seeds: [1, 1], contacts: 12 };
                 let judged = judge(&bench, &estimators, repetitions).unwrap().remove(0);
                 assert!(judged.failure.is_none() && judged.tallies.iter().all(|tally| tally.touches() == 12));
                 judged.tallies[1].figures().median_error_mm.unwrap().value

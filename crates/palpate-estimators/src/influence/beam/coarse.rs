@@ -82,7 +82,7 @@ pub(super) struct Coarse {
     norms: Vec<f64>,
     /// Chord k precedes node k.
     chords: Vec<Chord>,
-    h_m: f64,
+    pub h_m: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -19,35 +19,92 @@ use super::config::{Influence, InfluenceFitError};
 use super::learning::{LearntInfluence, NODES_EACH, learn};
 use crate::fit::FitTask;
 use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::{Layout, Sensor};
+use palpate_numerics::mean;
 
 pub(super) fn fit(config: Influence, task: FitTask) -> Result<BeamLocator, InfluenceFitError> {
-    let mut table =
-        InfluenceTable::empty(task.setup.layout().len(), task.setup.surface().extent().length_m());
-    let around = around_nodes(&table);
+    let layout = task.setup.layout();
+    let mut table = InfluenceTable::empty(layout.len(), task.setup.surface().extent().length_m());
+    let places = Places::new(&table, layout);
     let fill = &mut |s: usize, learnt: &LearntInfluence| {
         for node in 0..table.nodes() {
             if node.is_multiple_of(NODES_EACH) {
                 task.watch.round()?;
             }
-            let [left, here, right] = [3 * node, 3 * node + 1, 3 * node + 2];
-            let (rise, run_m) =
-                (learnt.mean(right) - learnt.mean(left), around[right].x_m - around[left].x_m);
             let at = node * table.sensors + s;
-            table.values[at] = learnt.mean(here);
-            table.slopes[at] = rise / run_m;
-            table.variances[at] = learnt.variance(here);
+            table.values[at] = learnt.mean(Places::at(node));
+            table.slopes[at] = places.slope(node, learnt);
+            table.variances[at] = learnt.variance(Places::at(node));
+        }
+        for [left, right] in cells_beside(&table, &layout.sensors()[s]) {
+            let square = places.square_error(left, s, &table, learnt);
+            for node in [left, right] {
+                table.variances[node * table.sensors + s] += square;
+            }
         }
         Ok(())
     };
-    let channels = learn(config, task, &around, fill)?;
+    let channels = learn(config, task, &places.all, fill)?;
     Ok(BeamLocator::new(table, channels, config.force_belief(task.setup), config.contacts))
 }
 
-/// Places to the left of each node, at it, and to the right.
-fn around_nodes(table: &InfluenceTable) -> Vec<Position> {
-    let h = 1e-5 * table.length_m;
-    let around = |x_m: f64| [(x_m - h).max(0.0), x_m, (x_m + h).min(table.length_m)];
-    (0..table.nodes()).flat_map(|node| around(table.node_m(node))).map(Position::along).collect()
+/// Nodes of the cells on both sides of the node next to a sensor, where a strain sensor's influence function
+/// has a kink.
+fn cells_beside(table: &InfluenceTable, sensor: &Sensor) -> [[usize; 2]; 2] {
+    let node = table.nearest_node(sensor.position.x_m).clamp(1, table.nodes() - 2);
+    [[node - 1, node], [node, node + 1]]
+}
+
+/// Places of learnt influence functions: beside each node and at it, then within the cells beside each sensor.
+struct Places {
+    all: Vec<Position>,
+    /// Left node of each cell with places within.
+    cells: Vec<usize>,
+}
+
+impl Places {
+    /// Fractions of a cell.
+    const WITHIN: [f64; 3] = [0.25, 0.5, 0.75];
+
+    fn new(table: &InfluenceTable, layout: &Layout) -> Self {
+        let beside_m = 1e-5 * table.length_m;
+        let around = |node: usize| [-beside_m, 0.0, beside_m].map(|way_m| table.node_m(node) + way_m);
+        let mut all_m: Vec<f64> = (0..table.nodes()).flat_map(around).collect();
+        let sensors = layout.sensors().iter();
+        let cells: Vec<usize> =
+            sensors.flat_map(|sensor| cells_beside(table, sensor)).map(|[left, _]| left).collect();
+        for left in &cells {
+            all_m.extend(Self::WITHIN.map(|part| table.node_m(*left) + part * table.spacing_m()));
+        }
+        let along = |x_m: f64| Position::along(x_m.clamp(0.0, table.length_m));
+        Self { all: all_m.into_iter().map(along).collect(), cells }
+    }
+
+    const fn at(node: usize) -> usize {
+        3 * node + 1
+    }
+
+    fn slope(&self, node: usize, learnt: &LearntInfluence) -> f64 {
+        let [left, right] = [Self::at(node) - 1, Self::at(node) + 1];
+        (learnt.mean(right) - learnt.mean(left)) / (self.all[right].x_m - self.all[left].x_m)
+    }
+
+    /// Mean square of the interpolation errors in a cell beside a sensor.
+    fn square_error(
+        &self,
+        left: usize,
+        sensor: usize,
+        table: &InfluenceTable,
+        learnt: &LearntInfluence,
+    ) -> f64 {
+        let cell =
+            self.cells.iter().position(|cell| *cell == left).expect("cells beside sensors have places");
+        let first = 3 * table.nodes() + Self::WITHIN.len() * cell;
+        mean((first..first + Self::WITHIN.len()).map(|place| {
+            let (value, _) = table.value_and_slope(&table.cell(self.all[place].x_m), sensor);
+            (learnt.mean(place) - value).powi(2)
+        }))
+    }
 }
 
 #[cfg(test)]

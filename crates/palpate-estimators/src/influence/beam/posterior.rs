@@ -3,7 +3,9 @@
 use super::coarse::{COARSE, MOST_MINIMA, Profile};
 use super::gauss_newton::Minimum;
 use super::search::Search;
-use crate::confidence_region::{CALIBRATED, ConfidenceRegion, Contacts, Force, is_near_end};
+use crate::confidence_region::{
+    BEYOND_A_BARRIER, CALIBRATED, ConfidenceRegion, Contacts, Force, is_near_end,
+};
 use crate::influence::config::ForceBelief;
 use crate::status::OTHER_PLACE;
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
@@ -36,15 +38,12 @@ pub(super) fn conclude(
         estimate.status = Status::NoContact;
         return;
     }
+    let elsewhere = better_minima(search, reading, best, profile);
+    let minima = elsewhere.as_ref().map_or(minima, |(found, count)| &found[..*count]);
+    let best = &minima[0];
     let sd_m = best.covariance[0].sqrt();
-    let clear = match search.force {
-        ForceBelief::Unknown => {
-            !is_near_end(best.x_m, sd_m, search.table.length_m) && !is_too_hard(search, best)
-        }
-        _ => 4.0 * sd_m < best.x_m && 4.0 * sd_m < search.table.length_m - best.x_m,
-    };
     let narrow = sd_m <= MOST_SPACINGS * search.gauss_newton.spacing.h_m && best.misfit.is_finite();
-    if minima.len() == 1 && clear && narrow {
+    if minima.len() == 1 && narrow && is_clear(search, best, profile) {
         estimate.contact = contact(search, best, normal_interval_95(best.x_m, sd_m));
         estimate.status = Status::Located;
         if !search.is_explained(reading.whitened, best) {
@@ -53,6 +52,49 @@ pub(super) fn conclude(
     } else {
         write_uncertain(search, reading, minima, profile, estimate);
     }
+}
+
+/// Minima that explain a reading which the search from the valleys of χ² does not.
+#[inline(always)]
+fn better_minima(
+    search: &Search,
+    reading: WhitenedReading,
+    best: &Minimum,
+    profile: &Profile,
+) -> Option<([Minimum; MOST_MINIMA], usize)> {
+    if best.covariance[0].is_finite() && search.rule.is_explained(best.misfit) {
+        return None;
+    }
+    let (found, count) = search.minima_from_everywhere(reading.whitened, profile);
+    let is_better = found[0].misfit < best.misfit && search.rule.is_explained(found[0].misfit);
+    is_better.then_some((found, count))
+}
+
+/// True of a minimum with a normal distribution about it.
+#[inline(always)]
+fn is_clear(search: &Search, best: &Minimum, profile: &Profile) -> bool {
+    let (sd_m, length_m) = (best.covariance[0].sqrt(), search.table.length_m);
+    match search.force {
+        ForceBelief::Unknown => {
+            !is_near_end(best.x_m, sd_m, length_m)
+                && !is_too_hard(search, best)
+                && is_parabola(search, best, profile)
+        }
+        _ => 4.0 * sd_m < best.x_m && 4.0 * sd_m < length_m - best.x_m,
+    }
+}
+
+/// True where χ² rises at least half as much as a parabola, up to a barrier.
+///
+/// Beside the outermost strain gauge it does not: place and force are confounded on one side alone.
+#[inline(always)]
+fn is_parabola(search: &Search, minimum: &Minimum, profile: &Profile) -> bool {
+    let inverse_sd = minimum.covariance[0].sqrt().recip();
+    let (step, at) = (search.coarse.h_m * inverse_sd, minimum.x_m * inverse_sd);
+    profile.misfits().iter().enumerate().fold(true, |all, (node, misfit)| {
+        let square = (node as f64 * step - at).powi(2);
+        all & (square < 4.0 || *misfit >= minimum.misfit + (0.5 * square).min(BEYOND_A_BARRIER))
+    })
 }
 
 /// True within four standard deviations of the greatest force.
@@ -74,7 +116,8 @@ fn write_uncertain(
     let is_near = |minimum: &Minimum| is_near_end(minimum.x_m, minimum.covariance[0].sqrt(), length_m);
     let is_roughly_known = matches!(search.force, ForceBelief::Normal { .. });
     let is_bounded = |minimum: &Minimum| is_near(minimum) || is_too_hard(search, minimum);
-    let trades_off = !is_roughly_known && minima.iter().any(is_bounded);
+    let is_one_sided = minima.len() == 1 && !is_parabola(search, &minima[0], profile);
+    let trades_off = !is_roughly_known && (minima.iter().any(is_bounded) || is_one_sided);
     let misfit = match trades_off.then(|| confidence_region(search, reading.whitened, minima)).flatten() {
         Some(found) => {
             found.write(estimate);

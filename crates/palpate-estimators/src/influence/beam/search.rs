@@ -3,14 +3,14 @@
 //! Symbols: d whitened reading (minus offsets, over the noise), f whitened influence, W force, a position,
 //! χ²(a, W) = |d − W·f(a)|² (+ the term of a normal prior of the force).
 
-use super::coarse::{Coarse, MOST_MINIMA, Profile};
+use super::coarse::{COARSE, Coarse, MOST_MINIMA, Profile};
 use super::gauss_newton::{GaussNewton, Minimum, grouped, paired};
 use super::spread::SpreadTable;
 use super::table::InfluenceTable;
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
 use crate::status::{LINE_PLACES, StatusRule, unknowns};
-use palpate_numerics::simd::EightLanes;
+use palpate_numerics::simd::{Array, EightLanes};
 
 /// Whitened table of the channels in use.
 #[derive(Clone, Debug, PartialEq)]
@@ -123,28 +123,63 @@ impl Search {
     ) -> ([Minimum; MOST_MINIMA], usize) {
         let whitened = scratch.whitened.groups(self.groups());
         self.coarse.scan::<V>(square, whitened, &mut scratch.profile);
-        let (valleys, valleys_count) = scratch.profile.valleys::<V>();
+        let (valleys, count) = scratch.profile.valleys::<V>();
+        self.minima_from::<V>(whitened, &scratch.profile, &valleys[..count])
+    }
+
+    /// Minima from every coarse node: Gauss–Newton steps cannot leave a stretch where place and force are
+    /// confounded.
+    #[cold]
+    pub fn minima_from_everywhere(
+        &self,
+        whitened: &[[f64; 8]],
+        profile: &Profile,
+    ) -> ([Minimum; MOST_MINIMA], usize) {
+        let nodes: [usize; COARSE] = std::array::from_fn(|node| node);
+        self.minima_from::<Array<f64, 8, false>>(whitened, profile, &nodes)
+    }
+
+    #[inline(always)]
+    fn minima_from<V: EightLanes>(
+        &self,
+        whitened: &[[f64; 8]],
+        profile: &Profile,
+        nodes: &[usize],
+    ) -> ([Minimum; MOST_MINIMA], usize) {
         let mut found = [Minimum::<f64>::nowhere(); MOST_MINIMA];
         let (mut count, mut best) = (0, f64::INFINITY);
-        for node in &valleys[..valleys_count] {
-            let start = self.coarse.start::<V, f64>(&[&scratch.profile], &[*node]);
+        for node in nodes {
+            let start = self.coarse.start::<V, f64>(&[profile], &[*node]);
             if start.floor > best + NEGLIGIBLE {
                 continue;
             }
             let (minimum, _) =
                 self.gauss_newton.minimum::<V, f64>(whitened, (start.x_m, start.force_n), MOST_STEPS);
             let near = 0.5 * self.gauss_newton.spacing.h_m;
-            if found[..count].iter().all(|other| (other.x_m - minimum.x_m).abs() > near) {
-                found[count] = minimum;
-                count += 1;
-                best = best.min(minimum.misfit);
+            let is_near = |other: &Minimum| (other.x_m - minimum.x_m).abs() <= near;
+            match found[..count].iter().position(is_near) {
+                Some(same) if minimum.misfit < found[same].misfit => found[same] = minimum,
+                Some(_) => {}
+                None if count < MOST_MINIMA => {
+                    found[count] = minimum;
+                    count += 1;
+                }
+                None => replace_worst(&mut found, minimum),
             }
+            best = best.min(minimum.misfit);
         }
         if count > 1 {
             found[..count].sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
             count = found[..count].iter().take_while(|m| m.misfit <= best + NEGLIGIBLE).count();
         }
         (found, count.max(1))
+    }
+}
+
+fn replace_worst(found: &mut [Minimum; MOST_MINIMA], minimum: Minimum) {
+    let worst = found.iter_mut().max_by(|a, b| a.misfit.total_cmp(&b.misfit));
+    if let Some(worst) = worst.filter(|worst| minimum.misfit < worst.misfit) {
+        *worst = minimum;
     }
 }
 

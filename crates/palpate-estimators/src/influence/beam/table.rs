@@ -136,8 +136,13 @@ impl InfluenceTable {
     }
 
     #[inline]
+    pub(super) fn nearest_node(&self, x_m: f64) -> usize {
+        ((x_m / self.spacing_m()).round().max(0.0) as usize).min(self.nodes() - 1)
+    }
+
+    #[inline]
     pub(super) fn variances_near(&self, x_m: f64) -> &[f64] {
-        let node = ((x_m / self.spacing_m()).round().max(0.0) as usize).min(self.nodes() - 1);
+        let node = self.nearest_node(x_m);
         &self.variances[node * self.sensors..(node + 1) * self.sensors]
     }
 }

@@ -1,4 +1,5 @@
 mod batch;
+mod gauges;
 mod offsets;
 mod reference;
 
