@@ -45,7 +45,7 @@ impl Bench {
         }
     }
 
-    fn new(self, seed: u64) -> Result<RawBench> {
+    fn raw_bench(self, seed: u64) -> Result<RawBench> {
         match self {
             Self::Strip { presses, places } => RawBench::strip(seed, presses, places),
             Self::Plate => RawBench::plate(seed),
@@ -81,7 +81,7 @@ impl Case {
     fn row(&self) -> Result<TableRow> {
         let [mut loses, mut right, mut moved, mut misread] = [(); 4].map(|()| Share::default());
         for seed in 0..self.benches {
-            let mut bench = self.bench.new(seed)?;
+            let mut bench = self.bench.raw_bench(seed)?;
             record_with_errors(&mut bench, self.errors.0);
             loses.add(seed, !excluded(&bench)?.is_empty());
             let wrong = WrongPresses::new(&mut bench);
