@@ -175,7 +175,7 @@ impl<P: LineParser> Parsing<P> {
     }
 
     /// Returns the values of the next line: `None` at the end, `Some(None)` without values.
-    pub fn next(&mut self, lines: &mut Lines) -> Result<Option<Option<P::Parsed>>, Failure> {
+    pub fn next(&mut self, lines: &mut Lines) -> Result<Option<Option<P::Values>>, Failure> {
         let Some(line) = lines.next()? else {
             let unfound = self.parser.progress().unfound();
             return unfound.map_or(Ok(None), |error| Err(input::csv_error(&error).into()));

@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use palpate_core::Estimate;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-use crate::fit::{CheckEstimate, Fitted, Locate, ReadingError};
+use crate::fit::{CheckEstimate, Locate, MethodLocator, ReadingError};
 use crate::status::NO_CONTACT;
 
 /// Readings of a block, with estimates of 0.9 kB each in a core's second-level cache.
@@ -55,8 +55,8 @@ pub enum BatchError {
     Cancelled(#[from] Cancelled),
 }
 
-impl<M: Locate> Fitted<M> {
-    /// Estimates the contacts of consecutive readings, equal to [`Fitted::locate`] to the last bit.
+impl<M: Locate> MethodLocator<M> {
+    /// Estimates the contacts of consecutive readings, equal to [`MethodLocator::locate`] to the last bit.
     ///
     /// ```
     /// use palpate_estimators::{arrangement::Training, fit::Fit, influence::Influence, setup::Setup};

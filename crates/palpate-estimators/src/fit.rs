@@ -170,7 +170,7 @@ pub trait Fit {
     ///
     /// # Errors
     /// Unsuitable recording.
-    fn fit(&self, setup: &Setup, recording: &Recording) -> Result<Fitted<Self::Method>, Self::Error> {
+    fn fit(&self, setup: &Setup, recording: &Recording) -> Result<MethodLocator<Self::Method>, Self::Error> {
         self.fit_task(FitTask::new(setup, recording))
     }
 
@@ -178,7 +178,7 @@ pub trait Fit {
     ///
     /// # Errors
     /// Unsuitable recording or cancellation.
-    fn fit_task(&self, task: FitTask) -> Result<Fitted<Self::Method>, Self::Error> {
+    fn fit_task(&self, task: FitTask) -> Result<MethodLocator<Self::Method>, Self::Error> {
         fit_with_interval_check(self, task)
     }
 
@@ -186,7 +186,7 @@ pub trait Fit {
     ///
     /// # Errors
     /// Unsuitable recording or cancellation.
-    fn fit_without_interval_check(&self, task: FitTask) -> Result<Fitted<Self::Method>, Self::Error> {
+    fn fit_without_interval_check(&self, task: FitTask) -> Result<MethodLocator<Self::Method>, Self::Error> {
         Ok(self.fit_unchecked(task)?.with_scatter_of(task.recording))
     }
 
@@ -199,9 +199,9 @@ pub trait Fit {
     ///
     /// # Errors
     /// Unsuitable recording or cancellation.
-    fn fit_unchecked(&self, task: FitTask) -> Result<Fitted<Self::Method>, Self::Error> {
+    fn fit_unchecked(&self, task: FitTask) -> Result<MethodLocator<Self::Method>, Self::Error> {
         task.check_channels()?;
-        Ok(Fitted::new(task, self.fit_method(task)?))
+        Ok(MethodLocator::new(task, self.fit_method(task)?))
     }
 
     /// Fits every seed of a queue, equal to [`Fit::fit_unchecked`]; some methods fit several at once.
@@ -226,7 +226,7 @@ pub trait Fit {
     fn fit_many(
         &self,
         task: FitTask,
-        queue: &mut dyn SeedQueue<Fitted<Self::Method>>,
+        queue: &mut dyn SeedQueue<MethodLocator<Self::Method>>,
     ) -> Result<(), Self::Error> {
         while let Some(seed) = queue.next_seed() {
             queue.fitted(seed, self.fit_unchecked(task.seed(seed))?);
@@ -247,12 +247,12 @@ const MOST_PRESSES_CHECKED: usize = 400;
 pub(crate) fn fit_with_interval_check<E: Fit + ?Sized>(
     estimator: &E,
     task: FitTask,
-) -> Result<Fitted<E::Method>, E::Error> {
+) -> Result<MethodLocator<E::Method>, E::Error> {
     let memo = FitMemo::new(task.setup);
     let task = task.memo(&memo);
     let locator = estimator.fit_without_interval_check(task)?;
     let interval_check = check_intervals(estimator, task)?;
-    Ok(Fitted { interval_check, ..locator })
+    Ok(MethodLocator { interval_check, ..locator })
 }
 
 /// Interval check; `None` for fewer than [`FEWEST_FOR_95`] positions, no intervals, or a failed fold. Drift
@@ -311,7 +311,7 @@ impl HoldOutTask<'_> {
     /// `fit` receives the split's number, and also returns seconds that it saved.
     pub fn run<M: Locate, E>(
         &self,
-        fit: impl Fn(usize, FitTask) -> Result<(Fitted<M>, f64), E>,
+        fit: impl Fn(usize, FitTask) -> Result<(MethodLocator<M>, f64), E>,
     ) -> Result<HeldOut, HoldOutError<E>> {
         let Self { setup, splits, seed, clock, watch, memo } = *self;
         let mut results = HeldOut { estimates: Vec::new(), fitting_s: 0.0, locating_s: 0.0 };
@@ -418,7 +418,7 @@ impl CheckEstimate for NoCheck {
 /// Locator: fitted method, setup and provenance.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Fitted<M: Locate> {
+pub struct MethodLocator<M: Locate> {
     /// Surface and sensors.
     pub setup: Setup,
     /// Provenance.
@@ -457,7 +457,7 @@ pub struct LocatorProvenance {
     pub choice: Vec<CandidateErrors>,
 }
 
-impl<M: Locate> Fitted<M> {
+impl<M: Locate> MethodLocator<M> {
     /// Returns the locator of a fitted method.
     pub fn new(task: FitTask, method: M) -> Self {
         let provenance = LocatorProvenance {
@@ -480,9 +480,9 @@ impl<M: Locate> Fitted<M> {
     }
 
     /// Converts the method, without the check of estimates.
-    pub fn map<N: Locate>(self, convert: impl FnOnce(M) -> N) -> Fitted<N> {
+    pub fn map<N: Locate>(self, convert: impl FnOnce(M) -> N) -> MethodLocator<N> {
         let Self { setup, provenance, method, untouched, untouched_scatter, untouched_drift, .. } = self;
-        Fitted {
+        MethodLocator {
             setup,
             provenance,
             method: convert(method),
@@ -500,7 +500,7 @@ impl<M: Locate> Fitted<M> {
     }
 }
 
-impl<M: Locate> Fitted<M> {
+impl<M: Locate> MethodLocator<M> {
     /// Estimates the contact of a reading.
     ///
     /// # Errors

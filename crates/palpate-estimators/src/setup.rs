@@ -20,7 +20,7 @@ use palpate_numerics::watch::Watch;
 
 /// Surface with sensors, and the known contact force or bound.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Unchecked")]
+#[serde(try_from = "SetupFields")]
 pub struct Setup {
     surface: SurfaceSpec,
     layout: Layout,
@@ -36,7 +36,7 @@ pub struct Setup {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename = "Setup")]
-struct Unchecked {
+struct SetupFields {
     surface: SurfaceSpec,
     layout: Layout,
     force_n: Option<f64>,
@@ -49,12 +49,12 @@ struct Unchecked {
     imperfections: Option<Imperfections>,
 }
 
-impl TryFrom<Unchecked> for Setup {
+impl TryFrom<SetupFields> for Setup {
     type Error = SetupError;
 
-    fn try_from(unchecked: Unchecked) -> Result<Self, SetupError> {
-        let Unchecked { surface, layout, force_n, greatest_force_n, force_range, columns, imperfections } =
-            unchecked;
+    fn try_from(fields: SetupFields) -> Result<Self, SetupError> {
+        let SetupFields { surface, layout, force_n, greatest_force_n, force_range, columns, imperfections } =
+            fields;
         let setup = Self { columns, force_range, ..Self::new(surface) };
         let setup = setup.with_layout(layout)?.with_force(force_n)?.with_greatest_force(greatest_force_n)?;
         match imperfections {

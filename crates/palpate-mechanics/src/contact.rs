@@ -49,7 +49,7 @@ impl OffSurface {
 /// # Ok::<(), palpate_numerics::OutOfRange>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Unchecked", into = "Unchecked")]
+#[serde(try_from = "ExtentFields", into = "ExtentFields")]
 pub enum Extent {
     /// Along x, with y = 0.
     Line {
@@ -70,20 +70,20 @@ pub enum Extent {
 pub struct Side(f64);
 
 #[derive(Serialize, Deserialize)]
-struct Unchecked {
+struct ExtentFields {
     length_m: f64,
     width_m: Option<f64>,
 }
 
-impl TryFrom<Unchecked> for Extent {
+impl TryFrom<ExtentFields> for Extent {
     type Error = OutOfRange;
 
-    fn try_from(Unchecked { length_m, width_m }: Unchecked) -> Result<Self, OutOfRange> {
+    fn try_from(ExtentFields { length_m, width_m }: ExtentFields) -> Result<Self, OutOfRange> {
         Self::new(length_m, width_m)
     }
 }
 
-impl From<Extent> for Unchecked {
+impl From<Extent> for ExtentFields {
     fn from(extent: Extent) -> Self {
         Self { length_m: extent.length_m(), width_m: extent.width_m() }
     }

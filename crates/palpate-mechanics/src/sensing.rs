@@ -86,13 +86,13 @@ pub struct Sensor {
 
 /// Sensors of a surface, in the order of a reading.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Unchecked")]
+#[serde(try_from = "LayoutFields")]
 pub struct Layout {
     sensors: Vec<Sensor>,
 }
 
 #[derive(Deserialize)]
-struct Unchecked {
+struct LayoutFields {
     sensors: Vec<Sensor>,
 }
 
@@ -106,10 +106,10 @@ pub struct LayoutError {
     pub fault: OutOfRange,
 }
 
-impl TryFrom<Unchecked> for Layout {
+impl TryFrom<LayoutFields> for Layout {
     type Error = LayoutError;
 
-    fn try_from(unchecked: Unchecked) -> Result<Self, LayoutError> {
+    fn try_from(unchecked: LayoutFields) -> Result<Self, LayoutError> {
         Self::new(unchecked.sensors)
     }
 }

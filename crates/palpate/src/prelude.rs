@@ -10,7 +10,7 @@ pub use palpate_estimators::estimator::{
     ContactEstimate, Estimate, Estimator, Locator, Profiler, Status, Tracker, TrackerConfig,
 };
 pub use palpate_estimators::evaluation::{Calibration, Evaluation, Portion, cross_validate};
-pub use palpate_estimators::fit::{Fit, FitTask, Fitted, Locate};
+pub use palpate_estimators::fit::{Fit, FitTask, Locate, MethodLocator};
 pub use palpate_estimators::gaussian_process::GaussianProcessEstimator;
 pub use palpate_estimators::imperfections::Imperfections;
 pub use palpate_estimators::influence::Influence;

@@ -37,7 +37,7 @@ use crate::detectable_force::DetectableForce;
 use crate::digit::{DigitEstimator, DigitFitError, DigitLocator, DigitShape, DigitTheory};
 use crate::evaluation::EvaluationError;
 use crate::fit::{
-    ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, MappedQueue, NoCheck, SeedQueue,
+    ChannelMismatch, Fit, FitTask, Locate, LocatorFault, MappedQueue, MethodLocator, NoCheck, SeedQueue,
 };
 use crate::fit_memo::FitMemo;
 use crate::gaussian_process::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
@@ -161,7 +161,7 @@ macro_rules! estimators {
                 let task = FitTask { recording: &learnt_from, ..task };
                 match self {
                     $(Self::$variant(estimator) => {
-                        let map = |_, locator: Fitted<$method>| locator.into_locator();
+                        let map = |_, locator: MethodLocator<$method>| locator.into_locator();
                         Ok(estimator.fit_many(task, &mut MappedQueue { queue, map })?)
                     })*
                     Self::Auto(_) => self.choose_estimator(asked)?.fit_many(asked, queue),
@@ -230,7 +230,7 @@ impl Estimator {
         {
             check = Some(by.keeping_intervals(task, |reading| method.locate(reading))?);
         }
-        let locator = Fitted { check: check.map(Box::new), ..Fitted::new(task, method) };
+        let locator = MethodLocator { check: check.map(Box::new), ..MethodLocator::new(task, method) };
         Ok(locator.with_scatter_of(task.recording))
     }
 }
@@ -335,7 +335,7 @@ impl Default for Estimator {
 }
 
 /// Locator of any estimator, as in files.
-pub type Locator = Fitted<Method>;
+pub type Locator = MethodLocator<Method>;
 
 impl Locate for Method {
     type Check = ReadingCheck;
@@ -365,7 +365,7 @@ impl Locate for Method {
     }
 }
 
-impl<M: Locate> Fitted<M>
+impl<M: Locate> MethodLocator<M>
 where
     Method: From<M>,
 {

@@ -2,7 +2,7 @@
 
 use super::{Evaluation, EvaluationError, Split, SplitOrigin};
 use crate::arrangement::{Training, all_over};
-use crate::fit::{Fit, FitTask, Fitted, Locate, SeedList};
+use crate::fit::{Fit, FitTask, Locate, MethodLocator, SeedList};
 use crate::recording::{NoUntouchedRow, Provenance, Recording, Zero};
 use crate::setup::Setup;
 use crate::simulate::{
@@ -53,7 +53,7 @@ pub struct CalibrationTrial<M: Locate> {
     /// Seed of the simulation and the fit.
     pub seed: u64,
     /// Locator.
-    pub locator: Fitted<M>,
+    pub locator: MethodLocator<M>,
     /// Evaluation over the contacts.
     pub evaluation: Evaluation,
 }
@@ -242,7 +242,7 @@ impl Calibration {
         &self,
         seed: u64,
         watch: Watch,
-        fit: impl FnOnce(FitTask) -> Result<Fitted<M>, E>,
+        fit: impl FnOnce(FitTask) -> Result<MethodLocator<M>, E>,
     ) -> Result<CalibrationTrial<M>, EvaluationError<E>> {
         let Split { training, held_out, .. } = self.simulate_watched(seed, watch)?;
         let task = FitTask::new(&self.known_setup, &training).seed(seed).watch(watch);

@@ -1,7 +1,7 @@
 //! Evaluation of an estimator on splits of a recording.
 
 use super::{EvaluatedContact, Evaluation, Split, SplitOrigin};
-use crate::fit::{Fit, FitTask, Fitted, HeldOut, HoldOutError, HoldOutTask, Locate, ReadingError};
+use crate::fit::{Fit, FitTask, HeldOut, HoldOutError, HoldOutTask, Locate, MethodLocator, ReadingError};
 use crate::interval_check::{HeldOutEstimate, widen_by_other_folds};
 use crate::recording::TooFewPositions;
 use crate::setup::Setup;
@@ -37,7 +37,7 @@ pub fn evaluate_splits<E: Fit>(
 
 pub(crate) fn evaluate_held_out<M: Locate, E: std::error::Error>(
     task: &HoldOutTask,
-    fit: impl Fn(usize, FitTask) -> Result<(Fitted<M>, f64), E>,
+    fit: impl Fn(usize, FitTask) -> Result<(MethodLocator<M>, f64), E>,
 ) -> Result<TimedEvaluation, EvaluationError<E>> {
     let HoldOutTask { setup, splits, .. } = *task;
     let extent = setup.surface().extent();

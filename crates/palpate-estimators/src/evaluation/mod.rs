@@ -18,7 +18,7 @@ pub use mapped_positions::{MappedPositions, SurfaceMap};
 pub use palpate_numerics::{median, percentile};
 
 use crate::batch::{BatchError, BatchOptions};
-use crate::fit::{Fitted, Locate, ReadingError};
+use crate::fit::{Locate, MethodLocator, ReadingError};
 use crate::load_profile::Cells;
 use crate::recording::{Recording, Row};
 use intervals::score_of_interval;
@@ -103,7 +103,7 @@ impl Evaluation {
     ///
     /// # Errors
     /// [`ReadingError`].
-    pub fn new<M: Locate>(locator: &Fitted<M>, recording: &Recording) -> Result<Self, ReadingError> {
+    pub fn new<M: Locate>(locator: &MethodLocator<M>, recording: &Recording) -> Result<Self, ReadingError> {
         let extent = locator.setup.surface().extent();
         let rows = recording.rows.iter().filter(|row| row.touches());
         let located = rows.map(|row| Ok(EvaluatedContact::new(row, &locator.locate(&row.reading)?, extent)));
@@ -115,7 +115,7 @@ impl Evaluation {
     /// # Errors
     /// [`BatchError`].
     pub fn new_watched<M>(
-        locator: &Fitted<M>,
+        locator: &MethodLocator<M>,
         recording: &Recording,
         watch: Watch,
     ) -> Result<Self, BatchError>

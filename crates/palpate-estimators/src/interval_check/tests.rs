@@ -144,7 +144,7 @@ fn a_rig_whose_noise_is_half_the_truth_gives_wider_intervals() {
     let locator = Influence::default().fit(&setup(5.0), &split.training).unwrap();
     let check = locator.interval_check.unwrap();
     let coverage = |locator| Evaluation::new(locator, &split.held_out).unwrap().coverage_percent().unwrap();
-    let unchecked = crate::fit::Fitted { interval_check: None, ..locator.clone() };
+    let unchecked = crate::fit::MethodLocator { interval_check: None, ..locator.clone() };
     assert!(check.position.factor > 1.2, "{check:?}");
     assert!(coverage(&unchecked) < 90.0, "{}", coverage(&unchecked));
     assert!(coverage(&locator) > 94.0, "{}", coverage(&locator));

@@ -22,7 +22,7 @@ pub use prepared::PreparedNetwork;
 pub use train::{Precision, TrainingTask, train_many, train_one};
 
 use crate::fit::{
-    ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, MappedQueue, NoCheck, SeedQueue,
+    ChannelMismatch, Fit, FitTask, Locate, LocatorFault, MappedQueue, MethodLocator, NoCheck, SeedQueue,
 };
 use crate::recording::{Recording, Row};
 use crate::setup::Setup;
@@ -308,11 +308,11 @@ impl Fit for Network {
     fn fit_many(
         &self,
         task: FitTask,
-        queue: &mut dyn SeedQueue<Fitted<NetworkLocator>>,
+        queue: &mut dyn SeedQueue<MethodLocator<NetworkLocator>>,
     ) -> Result<(), NetworkFitError> {
         task.check_channels()?;
         let coded = CodedTraining::new(self, task)?;
-        let map = |seed, network| Fitted::new(task.seed(seed), coded.locator(network));
+        let map = |seed, network| MethodLocator::new(task.seed(seed), coded.locator(network));
         let set = InstructionSet::best();
         Ok(train_many(set, self.precision, &coded.task(), &mut MappedQueue { queue, map }, task.watch)?)
     }
@@ -328,13 +328,13 @@ impl Network {
         task: FitTask,
         weights: Vec<f64>,
         outcome: TrainingOutcome,
-    ) -> Result<Option<Fitted<NetworkLocator>>, NetworkFitError> {
+    ) -> Result<Option<MethodLocator<NetworkLocator>>, NetworkFitError> {
         task.check_channels()?;
         let coded = CodedTraining::new(self, task)?;
         let topology = coded.topology.clone();
         Ok((weights.len() == topology.weight_count()).then(|| {
             let network = TrainedNetwork { topology, weights, outcome };
-            Fitted::new(task, coded.locator(network))
+            MethodLocator::new(task, coded.locator(network))
         }))
     }
 }

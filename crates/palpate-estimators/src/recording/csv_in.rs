@@ -385,14 +385,14 @@ impl TimeField {
 /// Line-by-line parser; the first lines determine the columns.
 pub trait LineParser {
     /// Values of a line.
-    type Parsed;
+    type Values;
 
     /// Parses the next line; `None` for the header, a blank line or a comment. Parsing continues after an
     /// error.
     ///
     /// # Errors
     /// [`CsvError`], with line and column.
-    fn parse_line(&mut self, line: &[u8]) -> Result<Option<Self::Parsed>, CsvError>;
+    fn parse_line(&mut self, line: &[u8]) -> Result<Option<Self::Values>, CsvError>;
 
     /// Progress.
     fn progress(&mut self) -> &mut dyn LineProgress;
@@ -427,7 +427,7 @@ impl ReadingParser {
 
 impl LineParser for ReadingParser {
     /// Values in SI units.
-    type Parsed = Vec<f64>;
+    type Values = Vec<f64>;
 
     fn parse_line(&mut self, line: &[u8]) -> Result<Option<Vec<f64>>, CsvError> {
         let Self { lines, columns, clock, time_s } = self;
@@ -535,7 +535,7 @@ impl<'a> TimedParser<'a> {
 }
 
 impl LineParser for TimedParser<'_> {
-    type Parsed = TimedReading;
+    type Values = TimedReading;
 
     fn parse_line(&mut self, line: &[u8]) -> Result<Option<TimedReading>, CsvError> {
         let Self { lines, clock, schema } = self;

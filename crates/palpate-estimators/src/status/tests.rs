@@ -5,7 +5,7 @@ use super::*;
 use crate::closed_form::ClosedForm;
 use crate::digit::{DigitEstimator, DigitTheory};
 use crate::estimator::{Estimator, Locator};
-use crate::fit::{Fit, FitTask, Fitted};
+use crate::fit::{Fit, FitTask, MethodLocator};
 use crate::fixtures::{Example, beam, digit, paper, plate, raw_recording};
 use crate::influence::{ForceLinearLocator, Influence, InfluenceLocator, Structure};
 use crate::neighbours::Neighbours;
@@ -221,7 +221,7 @@ fn false_alarm_rate_equals_that_of_the_rule() {
 }
 
 /// The beam's presses as raw channels; a seventh of the rows are untouched.
-fn force_linear_locator() -> Fitted<ForceLinearLocator> {
+fn force_linear_locator() -> MethodLocator<ForceLinearLocator> {
     let bench = paper(5e-6, 100);
     let mut recording = bench.simulate(0);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);

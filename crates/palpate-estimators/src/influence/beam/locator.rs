@@ -25,16 +25,16 @@ use std::sync::Arc;
 
 /// Locator that inverts the influence functions of a line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Stored", into = "Stored")]
+#[serde(try_from = "BeamContents", into = "BeamContents")]
 pub struct BeamLocator {
-    stored: Stored,
+    stored: BeamContents,
     search: Search,
 }
 
 /// Contents of a locator file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Stored {
+struct BeamContents {
     table: InfluenceTable,
     channels: Channels,
     force: ForceBelief,
@@ -48,7 +48,7 @@ impl BeamLocator {
         force: ForceBelief,
         contacts: usize,
     ) -> Self {
-        Stored { table, channels, force, contacts }.into_locator()
+        BeamContents { table, channels, force, contacts }.into_locator()
     }
 
     /// Locates a reading with reusable memory.
@@ -96,14 +96,14 @@ impl BeamLocator {
     /// Returns influence function, offset and noise of each channel, in its SI unit; `None` for disabled
     /// channels.
     pub fn influences(&self) -> Vec<Option<LoadChannel<'_>>> {
-        let Stored { table, channels, .. } = &self.stored;
+        let BeamContents { table, channels, .. } = &self.stored;
         let function = |channel: usize| Arc::new(table.function(channel)) as Arc<dyn InfluenceFunction + '_>;
         channels.influences(channels.live().into_iter().map(function))
     }
 
     /// Returns the influence functions with their uncertainty at the nodes.
     pub fn influences_at_nodes(&self) -> InfluencesAtNodes {
-        let Stored { table, channels, .. } = &self.stored;
+        let BeamContents { table, channels, .. } = &self.stored;
         let positions = (0..table.nodes()).map(|node| Position::along(table.node_m(node))).collect();
         InfluencesAtNodes::of_table(positions, channels, [&table.values, &table.variances])
     }
@@ -131,7 +131,7 @@ impl BeamLocator {
     /// Disables channel `channel` (from 0); returns false, without a change, when no channel would remain.
     pub fn leave_out(&mut self, channel: usize) -> bool {
         let Some(channels) = self.stored.channels.without(channel) else { return false };
-        *self = Stored { channels, ..self.stored.clone() }.into_locator();
+        *self = BeamContents { channels, ..self.stored.clone() }.into_locator();
         true
     }
 
@@ -277,7 +277,7 @@ fn locate_into<V: EightLanes>(
     conclude(search, reading, &minima[..count], &scratch.profile, estimate);
 }
 
-impl Stored {
+impl BeamContents {
     fn into_locator(self) -> BeamLocator {
         BeamLocator { search: Search::new(&self.table, &self.channels, self.force), stored: self }
     }
@@ -303,16 +303,16 @@ impl Stored {
     }
 }
 
-impl TryFrom<Stored> for BeamLocator {
+impl TryFrom<BeamContents> for BeamLocator {
     type Error = LocatorFault;
 
-    fn try_from(stored: Stored) -> Result<Self, LocatorFault> {
+    fn try_from(stored: BeamContents) -> Result<Self, LocatorFault> {
         stored.check()?;
         Ok(stored.into_locator())
     }
 }
 
-impl From<BeamLocator> for Stored {
+impl From<BeamLocator> for BeamContents {
     fn from(locator: BeamLocator) -> Self {
         locator.stored
     }

@@ -6,7 +6,7 @@
 //! the end by its prior. For a known force either end of the grid may explain a contact beyond it: an
 //! interval that reaches such an end is the whole surface.
 
-use super::locator::{ForceLinearLocator, Stored};
+use super::locator::{ForceLinearContents, ForceLinearLocator};
 use crate::confidence_region::{CALIBRATED, ConfidenceRegion, Contacts, Force};
 use crate::influence::grid::Axis;
 use crate::status::OTHER_PLACE;
@@ -101,7 +101,7 @@ impl ForceLinearLocator {
     }
 
     fn on_surface(&self, axis: Axis, found: &ConfidenceRegion) -> ((f64, f64), Option<(f64, f64)>) {
-        let Stored { prior, .. } = &self.stored;
+        let ForceLinearContents { prior, .. } = &self.stored;
         let (_, hardest_n) = self.force_prior.ends_n();
         /// Fraction of the surface's length.
         const ROUNDING: f64 = 1e-9;

@@ -98,7 +98,7 @@ impl Tables {
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Stored {
+pub(super) struct ForceLinearContents {
     pub x: Axis,
     pub y: Axis,
     /// Least and greatest coordinates, in metres; empty in files without them.
@@ -154,9 +154,9 @@ fn is_one(value: &f64) -> bool {
 
 /// Locator by offsets and influence functions without a model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Stored", into = "Stored")]
+#[serde(try_from = "ForceLinearContents", into = "ForceLinearContents")]
 pub struct ForceLinearLocator {
-    pub(super) stored: Stored,
+    pub(super) stored: ForceLinearContents,
     /// Prior of φ.
     pub(super) force_prior: ForcePrior,
     /// f, v and β.
@@ -203,7 +203,7 @@ pub(super) const VARIANCES: usize = 1;
 pub(super) const COVARIANCES: usize = 2;
 pub(super) const LAYERS: usize = 3;
 
-impl Stored {
+impl ForceLinearContents {
     pub fn into_locator(self) -> ForceLinearLocator {
         let mut locator = ForceLinearLocator {
             force_prior: self.force_prior(),
@@ -318,16 +318,16 @@ impl Stored {
     }
 }
 
-impl TryFrom<Stored> for ForceLinearLocator {
+impl TryFrom<ForceLinearContents> for ForceLinearLocator {
     type Error = LocatorFault;
 
-    fn try_from(stored: Stored) -> Result<Self, LocatorFault> {
+    fn try_from(stored: ForceLinearContents) -> Result<Self, LocatorFault> {
         stored.check()?;
         Ok(stored.into_locator())
     }
 }
 
-impl From<ForceLinearLocator> for Stored {
+impl From<ForceLinearLocator> for ForceLinearContents {
     fn from(locator: ForceLinearLocator) -> Self {
         locator.stored
     }

@@ -1,6 +1,6 @@
 //! Disabling of a channel of a force-linear surface.
 
-use super::locator::{ForceLinearLocator, Stored};
+use super::locator::{ForceLinearContents, ForceLinearLocator};
 use crate::influence::missing_channel::residual_limit_after;
 
 impl ForceLinearLocator {
@@ -19,7 +19,7 @@ impl ForceLinearLocator {
     }
 }
 
-impl Stored {
+impl ForceLinearContents {
     /// Removes a channel, counted from 0 among those in use; `freedom` is that of the residual before.
     fn without_channel(mut self, removed: usize, freedom: usize) -> Self {
         self.live.remove(removed);

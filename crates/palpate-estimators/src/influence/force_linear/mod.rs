@@ -48,7 +48,7 @@ use crate::setup::Setup;
 use crate::status::FalseAlarmRate;
 use force_prior::PressForces;
 use learning::InfluenceModel;
-use locator::{Stored, Tables};
+use locator::{ForceLinearContents, Tables};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::mean;
 use saturation_fit::Linearization;
@@ -120,7 +120,7 @@ fn fit_condensed(
         (coordinates().fold(f64::INFINITY, f64::min), coordinates().fold(f64::NEG_INFINITY, f64::max))
     };
     let functions = Tables::new(&functions);
-    let mut locator = Stored {
+    let mut locator = ForceLinearContents {
         x,
         y,
         outermost_m: (0..extent.dimensions()).map(outermost_m).collect(),

@@ -10,7 +10,9 @@
 //! with m(a) for the 1 if noise depends on the position, and φ(F) for F. Without the determinant, large v
 //! between presses would fit every reading.
 
-use super::locator::{COVARIANCES, CellScan, ForceLinearLocator, LAYERS, Stored, VALUES, VARIANCES};
+use super::locator::{
+    COVARIANCES, CellScan, ForceLinearContents, ForceLinearLocator, LAYERS, VALUES, VARIANCES,
+};
 use crate::distributed_contact::{BoundedContact, distributed_contact_bound, distributed_contact_score};
 use crate::force_prior::{ForceIntegral, ForceLikelihood};
 use crate::influence::grid::Axis;
@@ -53,7 +55,7 @@ impl ForceLinearLocator {
     }
 
     pub(super) fn estimate(&self, relative: &[f64]) -> Estimate {
-        let Stored { residual_limit, spread_limit, .. } = self.stored;
+        let ForceLinearContents { residual_limit, spread_limit, .. } = self.stored;
         let limits = Limits { misfit: residual_limit, spread: spread_limit.unwrap_or(f64::INFINITY) };
         Inversion::new(self.likelihood(relative)).estimate(self.force_knowledge(), limits)
     }
@@ -240,7 +242,7 @@ impl ContactLikelihood for ReadingLikelihood<'_> {
 
     /// Large variances of the calibration change too much between nodes.
     fn bounds_are_loose(&self) -> bool {
-        let Stored { channels_as_one, .. } = self.locator.stored;
+        let ForceLinearContents { channels_as_one, .. } = self.locator.stored;
         !self.locator.shared.is_empty() || channels_as_one > 1.0 || self.locator.is_uncertain
     }
 

@@ -2,7 +2,7 @@
 //! few positions with recorded forces, and contacts of unknown force. The reference is a regression with
 //! SciPy: offset + force × cubic spline of the position.
 
-use super::locator::{Stored, Tables};
+use super::locator::{ForceLinearContents, Tables};
 use super::posterior::Functions;
 use super::prior::Prior;
 use super::{ForceLinearLocator, evidence, fit, fit_condensed, posterior};
@@ -199,7 +199,7 @@ impl Bench {
 
     /// Locator with the true offsets, influence functions and noise.
     fn with_known_functions(&self, locator: &ForceLinearLocator) -> ForceLinearLocator {
-        let mut stored = Stored::from(locator.clone());
+        let mut stored = ForceLinearContents::from(locator.clone());
         let (x, y) = (stored.x, stored.y);
         let places =
             (0..x.count).flat_map(|i| (0..y.count).map(move |j| (x.value(i as f64), y.value(j as f64))));

@@ -1,7 +1,7 @@
 //! Fit of a measured surface.
 
 use super::config::{MeasuredError, MeasuredInfluence, Scale};
-use super::locator::{MeasuredLocator, NuisanceRole, Stored};
+use super::locator::{MeasuredContents, MeasuredLocator, NuisanceRole};
 use super::presses::{Presses, nuisance_coordinates};
 use super::table::Table;
 use crate::fit::{Fit, FitTask};
@@ -71,7 +71,7 @@ impl Fit for MeasuredInfluence {
         }
         // Interpolation errors of the table count as noise.
         let factor = missed[0].hypot(missed[1]).hypot(1.0);
-        let locator = Stored {
+        let locator = MeasuredContents {
             readings: presses.readings,
             whitening: whitening.widened(factor),
             table: table.widened(factor),

@@ -33,7 +33,7 @@ pub enum NuisanceRole {
 
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Stored {
+pub(super) struct MeasuredContents {
     pub readings: Scale,
     pub whitening: Whitening,
     pub table: Table,
@@ -49,9 +49,9 @@ pub(super) struct Stored {
 
 /// Locator by learnt readings.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(try_from = "Stored", into = "Stored")]
+#[serde(try_from = "MeasuredContents", into = "MeasuredContents")]
 pub struct MeasuredLocator {
-    pub(super) stored: Stored,
+    pub(super) stored: MeasuredContents,
     search: Search,
 }
 
@@ -183,7 +183,7 @@ impl MeasuredLocator {
 
     /// Whitened reading; `None` off its scale.
     fn likelihood(&self, reading: &[f64]) -> Option<ReadingLikelihood<'_>> {
-        let Stored { readings, whitening, .. } = &self.stored;
+        let MeasuredContents { readings, whitening, .. } = &self.stored;
         let in_use = self.stored.channels_in_use().map(|channel| readings.scaled(reading[channel]));
         let scaled = in_use.collect::<Option<Vec<f64>>>()?;
         let mut whitened = vec![0.0; whitening.channels()];
@@ -206,7 +206,7 @@ impl Locate for MeasuredLocator {
     type Check = NoCheck;
 
     fn locate(&self, reading: &[f64]) -> Estimate {
-        let Stored { table, residual_limit, .. } = &self.stored;
+        let MeasuredContents { table, residual_limit, .. } = &self.stored;
         match self.likelihood(reading) {
             Some(likelihood) => {
                 let limits = Limits { misfit: *residual_limit, spread: f64::INFINITY };
@@ -217,7 +217,7 @@ impl Locate for MeasuredLocator {
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
-        let Stored { whitening, missing, .. } = &self.stored;
+        let MeasuredContents { whitening, missing, .. } = &self.stored;
         LocatorFault::check_count(
             "whitened channels",
             setup.layout().len(),
@@ -226,7 +226,7 @@ impl Locate for MeasuredLocator {
     }
 }
 
-impl Stored {
+impl MeasuredContents {
     pub fn into_locator(self) -> MeasuredLocator {
         MeasuredLocator { search: Search::new(&self.table, &self.whitening), stored: self }
     }
@@ -253,16 +253,16 @@ impl Stored {
     }
 }
 
-impl TryFrom<Stored> for MeasuredLocator {
+impl TryFrom<MeasuredContents> for MeasuredLocator {
     type Error = LocatorFault;
 
-    fn try_from(stored: Stored) -> Result<Self, LocatorFault> {
+    fn try_from(stored: MeasuredContents) -> Result<Self, LocatorFault> {
         stored.check()?;
         Ok(stored.into_locator())
     }
 }
 
-impl From<MeasuredLocator> for Stored {
+impl From<MeasuredLocator> for MeasuredContents {
     fn from(locator: MeasuredLocator) -> Self {
         locator.stored
     }
@@ -479,7 +479,7 @@ impl ContactLikelihood for ReadingLikelihood<'_> {
     }
 
     fn force(&self, latent: f64, variance: f64) -> (f64, f64) {
-        let Stored { table, nuisance, role, .. } = &self.locator.stored;
+        let MeasuredContents { table, nuisance, role, .. } = &self.locator.stored;
         if *role != NuisanceRole::Force {
             return (0.0, 0.0);
         }

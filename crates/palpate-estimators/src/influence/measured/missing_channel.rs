@@ -4,7 +4,7 @@
 //! (Wᵀ·W)⁻¹ and W⁻¹ = C·Wᵀ give C, S = W⁻¹·diag(d)·W⁻ᵀ and the means of the readings. Without the rows and
 //! columns of the channel, these have a whitening of their own.
 
-use super::locator::{MeasuredLocator, Stored};
+use super::locator::{MeasuredContents, MeasuredLocator};
 use super::table::Table;
 use crate::influence::missing_channel::residual_limit_after;
 use crate::influence::noise::{Noise, Whitening};
@@ -29,7 +29,7 @@ impl MeasuredLocator {
     }
 }
 
-impl Stored {
+impl MeasuredContents {
     /// Channels of a reading that are in use, from 0.
     pub fn channels_in_use(&self) -> impl Iterator<Item = usize> {
         let channels = self.whitening.channels() + self.missing.len();

@@ -17,16 +17,16 @@ use std::sync::Arc;
 
 /// Locator that inverts the influence functions of a plane.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Stored", into = "Stored")]
+#[serde(try_from = "PlaneContents", into = "PlaneContents")]
 pub struct PlaneLocator {
-    stored: Stored,
+    stored: PlaneContents,
     search: Search,
 }
 
 /// Contents of a locator file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Stored {
+struct PlaneContents {
     table: PlaneTable,
     channels: Channels,
     force: ForceBelief,
@@ -38,7 +38,7 @@ pub struct PlaneScratch(Scratch);
 
 impl PlaneLocator {
     pub(super) fn new(table: PlaneTable, channels: Channels, force: ForceBelief) -> Self {
-        Stored { table, channels, force }.into_locator()
+        PlaneContents { table, channels, force }.into_locator()
     }
 
     /// Returns the influence functions.
@@ -48,7 +48,7 @@ impl PlaneLocator {
 
     /// Returns the influence functions with their uncertainty at the nodes.
     pub fn influences_at_nodes(&self) -> InfluencesAtNodes {
-        let Stored { table, channels, .. } = &self.stored;
+        let PlaneContents { table, channels, .. } = &self.stored;
         let positions = (0..table.nodes()).map(|node| table.node(node)).collect();
         InfluencesAtNodes::of_table(positions, channels, [&table.values, &table.variances])
     }
@@ -56,7 +56,7 @@ impl PlaneLocator {
     /// Returns influence function, offset and noise of each channel, in its SI unit; `None` for disabled
     /// channels.
     pub fn influences(&self) -> Vec<Option<LoadChannel<'_>>> {
-        let Self { stored: Stored { channels, .. }, search } = self;
+        let Self { stored: PlaneContents { channels, .. }, search } = self;
         let function = |(k, channel): (usize, &usize)| {
             let function = search.patches.function(k, channels.noise_sd[*channel]);
             Arc::new(function) as Arc<dyn InfluenceFunction + '_>
@@ -86,7 +86,7 @@ impl PlaneLocator {
     /// Disables channel `channel` (from 0); returns false, without a change, when no channel would remain.
     pub fn leave_out(&mut self, channel: usize) -> bool {
         let Some(channels) = self.stored.channels.without(channel) else { return false };
-        *self = Stored { channels, ..self.stored.clone() }.into_locator();
+        *self = PlaneContents { channels, ..self.stored.clone() }.into_locator();
         true
     }
 
@@ -119,7 +119,7 @@ impl Locate for PlaneLocator {
     }
 }
 
-impl Stored {
+impl PlaneContents {
     fn into_locator(self) -> PlaneLocator {
         PlaneLocator { search: Search::new(&self.table, &self.channels, self.force), stored: self }
     }
@@ -144,16 +144,16 @@ impl Stored {
     }
 }
 
-impl TryFrom<Stored> for PlaneLocator {
+impl TryFrom<PlaneContents> for PlaneLocator {
     type Error = LocatorFault;
 
-    fn try_from(stored: Stored) -> Result<Self, LocatorFault> {
+    fn try_from(stored: PlaneContents) -> Result<Self, LocatorFault> {
         stored.check()?;
         Ok(stored.into_locator())
     }
 }
 
-impl From<PlaneLocator> for Stored {
+impl From<PlaneLocator> for PlaneContents {
     fn from(locator: PlaneLocator) -> Self {
         locator.stored
     }

@@ -1,7 +1,7 @@
 //! Strain bridges with offsets far above their signal, and untouched rows.
 
 use super::*;
-use crate::fit::{Fit, Fitted};
+use crate::fit::{Fit, MethodLocator};
 use crate::influence::{Influence, InfluenceLocator};
 use crate::recording::Row;
 use crate::simulate::CleanSensors;
@@ -51,7 +51,7 @@ impl Bridges {
     }
 
     /// Mean error in mm and coverage of contacts of 1 N to 6 N.
-    fn judged(&mut self, locator: &Fitted<InfluenceLocator>) -> [f64; 2] {
+    fn judged(&mut self, locator: &MethodLocator<InfluenceLocator>) -> [f64; 2] {
         const TOUCHES: usize = 200;
         let (mut error_mm, mut held) = (0.0, 0);
         for _ in 0..TOUCHES {

@@ -63,7 +63,7 @@ fn calibration_variance_is_less_than_that_of_one_reading() {
     assert_eq!(one.position_m2[1..], [0.0; 2]);
     // Known functions leave the overdispersion, if any.
     for overdispersion in [1.0, 1.5] {
-        let mut known = Stored::from(bench.with_known_functions(&locator));
+        let mut known = ForceLinearContents::from(bench.with_known_functions(&locator));
         known.channels_as_one = overdispersion;
         let likelihood = ForceLinearLikelihood::new(&known.into_locator()).unwrap();
         let [none, _] = likelihood.calibration_variance(&[contact]);
