@@ -162,9 +162,9 @@ mod tests {
         for knowledge in [Knowledge::Model, Knowledge::Measured] {
             let error_mm = |world| {
                 let bench = Bench { rig: &rig, world, knowledge, forces: Forces::UNKNOWN };
-                let repetitions = Repetitions { seeds: [1, 1], contacts: 12 };
+                let repetitions = Repetitions { seeds: [1, 1], contacts: 50 };
                 let judged = judge(&bench, &estimators, repetitions).unwrap().remove(0);
-                assert!(judged.failure.is_none() && judged.tallies.iter().all(|tally| tally.touches() == 12));
+                assert!(judged.failure.is_none() && judged.tallies.iter().all(|tally| tally.touches() == 50));
                 judged.tallies[1].figures().median_error_mm.unwrap().value
             };
             let [clean_mm, imperfect_mm] = [World::Clean, World::Imperfect].map(error_mm);
