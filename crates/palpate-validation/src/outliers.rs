@@ -32,7 +32,7 @@ enum Bench {
         places: usize,
     },
     Plate,
-    /// Pressed at random places; more than a thousand presses are condensed.
+    /// Pressed at random places.
     PlateOf(usize),
 }
 
@@ -134,15 +134,14 @@ fn run(size: Size, progress: Progress) -> Result<Vec<Table>> {
     let strip = |presses, places| Bench::Strip { presses, places };
     let mut cases = Vec::new();
     for errors in PRESS_ERRORS {
-        cases.push(Case { bench: strip(25, 9), errors, benches: size.pick(50, 2) });
-        cases.push(Case { bench: strip(60, 15), errors, benches: size.pick(50, 1) });
-        cases.push(Case { bench: strip(120, 30), errors, benches: size.pick(20, 1) });
+        cases.push(Case { bench: strip(25, 9), errors, benches: size.pick(25, 2) });
+        cases.push(Case { bench: strip(60, 15), errors, benches: size.pick(25, 1) });
+        cases.push(Case { bench: strip(120, 30), errors, benches: size.pick(8, 1) });
     }
     let as_recorded = PRESS_ERRORS[0];
-    cases.push(Case { bench: Bench::Plate, errors: as_recorded, benches: size.pick(50, 1) });
+    cases.push(Case { bench: Bench::Plate, errors: as_recorded, benches: size.pick(25, 1) });
     if size == Size::Full {
-        cases.push(Case { bench: Bench::PlateOf(450), errors: as_recorded, benches: 10 });
-        cases.push(Case { bench: Bench::PlateOf(1100), errors: as_recorded, benches: 2 });
+        cases.push(Case { bench: Bench::PlateOf(450), errors: as_recorded, benches: 6 });
     }
     let rows = in_parallel(&cases, Case::row, |case| case.labels().join(", "), progress);
     let mut table = Table::new("Shares of all benches.", &["bench", "presses"], Case::columns());
