@@ -32,13 +32,13 @@ pub(super) fn fit(config: Influence, task: FitTask) -> Result<BeamLocator, Influ
                 task.watch.round()?;
             }
             let at = node * table.sensors + s;
-            table.values[at] = learnt.mean(Places::at(node));
+            table.values[at] = learnt.mean(Places::of_node(node));
             table.slopes[at] = places.slope(node, learnt);
-            table.variances[at] = learnt.variance(Places::at(node));
+            table.variances[at] = learnt.variance(Places::of_node(node));
         }
-        for [left, right] in cells_beside(&table, &layout.sensors()[s]) {
-            let square = places.square_error(left, s, &table, learnt);
-            for node in [left, right] {
+        for (side, nodes) in cells_beside(&table, &layout.sensors()[s]).into_iter().enumerate() {
+            let square = places.square_error(s, side, &table, learnt);
+            for node in nodes {
                 table.variances[node * table.sensors + s] += square;
             }
         }
@@ -58,8 +58,6 @@ fn cells_beside(table: &InfluenceTable, sensor: &Sensor) -> [[usize; 2]; 2] {
 /// Places of learnt influence functions: beside each node and at it, then within the cells beside each sensor.
 struct Places {
     all: Vec<Position>,
-    /// Left node of each cell with places within.
-    cells: Vec<usize>,
 }
 
 impl Places {
@@ -70,36 +68,31 @@ impl Places {
         let beside_m = 1e-5 * table.length_m;
         let around = |node: usize| [-beside_m, 0.0, beside_m].map(|way_m| table.node_m(node) + way_m);
         let mut all_m: Vec<f64> = (0..table.nodes()).flat_map(around).collect();
-        let sensors = layout.sensors().iter();
-        let cells: Vec<usize> =
-            sensors.flat_map(|sensor| cells_beside(table, sensor)).map(|[left, _]| left).collect();
-        for left in &cells {
-            all_m.extend(Self::WITHIN.map(|part| table.node_m(*left) + part * table.spacing_m()));
+        for [left, _] in layout.sensors().iter().flat_map(|sensor| cells_beside(table, sensor)) {
+            all_m.extend(Self::WITHIN.map(|part| table.node_m(left) + part * table.spacing_m()));
         }
         let along = |x_m: f64| Position::along(x_m.clamp(0.0, table.length_m));
-        Self { all: all_m.into_iter().map(along).collect(), cells }
+        Self { all: all_m.into_iter().map(along).collect() }
     }
 
-    const fn at(node: usize) -> usize {
+    const fn of_node(node: usize) -> usize {
         3 * node + 1
     }
 
     fn slope(&self, node: usize, learnt: &LearntInfluence) -> f64 {
-        let [left, right] = [Self::at(node) - 1, Self::at(node) + 1];
+        let [left, right] = [Self::of_node(node) - 1, Self::of_node(node) + 1];
         (learnt.mean(right) - learnt.mean(left)) / (self.all[right].x_m - self.all[left].x_m)
     }
 
-    /// Mean square of the interpolation errors in a cell beside a sensor.
+    /// Mean square of the interpolation errors in the cell on one side of a sensor.
     fn square_error(
         &self,
-        left: usize,
         sensor: usize,
+        side: usize,
         table: &InfluenceTable,
         learnt: &LearntInfluence,
     ) -> f64 {
-        let cell =
-            self.cells.iter().position(|cell| *cell == left).expect("cells beside sensors have places");
-        let first = 3 * table.nodes() + Self::WITHIN.len() * cell;
+        let first = 3 * table.nodes() + Self::WITHIN.len() * (2 * sensor + side);
         mean((first..first + Self::WITHIN.len()).map(|place| {
             let (value, _) = table.value_and_slope(&table.cell(self.all[place].x_m), sensor);
             (learnt.mean(place) - value).powi(2)

@@ -15,6 +15,12 @@ use palpate_numerics::{bisect, normal_cdf, normal_interval_95};
 /// Standard deviation, in node spacings, above which a minimum is not a parabola.
 const MOST_SPACINGS: f64 = 1.5;
 
+/// Policy: a normal distribution stands for places whose χ² rises half as much as its parabola. The interval is
+/// then too short by at most √2 on that side.
+const LEAST_RISE: f64 = 0.5;
+/// Squared distance, in standard deviations, of the ends of the interval: χ² at nodes within does not decide.
+const INNER_SQUARE: f64 = 4.0;
+
 #[derive(Clone, Copy)]
 pub(super) struct WhitenedReading<'a> {
     pub whitened: &'a [[f64; 8]],
@@ -84,7 +90,7 @@ fn is_clear(search: &Search, best: &Minimum, profile: &Profile) -> bool {
     }
 }
 
-/// True where χ² rises at least half as much as a parabola, up to a barrier.
+/// True where χ² rises at least [`LEAST_RISE`] times as much as a parabola, up to a barrier.
 ///
 /// Beside the outermost strain gauge it does not: place and force are confounded on one side alone.
 #[inline(always)]
@@ -93,7 +99,8 @@ fn is_parabola(search: &Search, minimum: &Minimum, profile: &Profile) -> bool {
     let (step, at) = (search.coarse.h_m * inverse_sd, minimum.x_m * inverse_sd);
     profile.misfits().iter().enumerate().fold(true, |all, (node, misfit)| {
         let square = (node as f64 * step - at).powi(2);
-        all & (square < 4.0 || *misfit >= minimum.misfit + (0.5 * square).min(BEYOND_A_BARRIER))
+        let rise = (LEAST_RISE * square).min(BEYOND_A_BARRIER);
+        all & (square < INNER_SQUARE || *misfit >= minimum.misfit + rise)
     })
 }
 

@@ -4,7 +4,7 @@
 use super::*;
 use palpate_mechanics::sensing::SensorKind::Strain;
 use palpate_mechanics::surface::InfluenceFunction;
-use palpate_mechanics::units::{microstrain, mm};
+use palpate_mechanics::units::{microstrain, mm, newtons};
 
 const GAUGES_MM: [f64; 4] = [50.0, 150.0, 250.0, 350.0];
 const FORCES_N: [f64; 3] = [1.0, 3.0, 10.0];
@@ -12,7 +12,7 @@ const FORCES_N: [f64; 3] = [1.0, 3.0, 10.0];
 fn gauges() -> (Setup, BeamLocator) {
     let setup = Setup::new(crate::fixtures::beam());
     let setup = setup.sensors(Strain.at_x(GAUGES_MM.map(mm)).noise(microstrain(0.5))).unwrap();
-    let pressed = setup.clone().known_force(palpate_mechanics::units::newtons(3.0)).unwrap();
+    let pressed = setup.clone().known_force(newtons(3.0)).unwrap();
     let recording = pressed.simulate(&crate::arrangement::Training::even(10), 1).unwrap();
     let mechanics = Influence { source: InfluenceSource::Mechanics, ..Influence::default() };
     let locator = fit(mechanics, &setup, &recording);
